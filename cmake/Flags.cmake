@@ -1,0 +1,25 @@
+# Compiler flags that every target of ours shares.
+add_library(pathscope_flags INTERFACE)
+target_compile_features(pathscope_flags INTERFACE cxx_std_20)
+target_compile_options(pathscope_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor)
+
+# The image is the same bits on every machine that runs this binary: no contraction of a*b+c that one code path has
+# and another has not, no reordering of sums. SSE4.2 (x86-64-v2) is on every x86-64 machine since 2009.
+target_compile_options(pathscope_flags INTERFACE -ffp-contract=off -fno-math-errno)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_compile_options(pathscope_flags INTERFACE -march=x86-64-v2)
+endif()
+
+option(PATHSCOPE_WERROR "Treat warnings as errors" OFF)
+if(PATHSCOPE_WERROR)
+    target_compile_options(pathscope_flags INTERFACE -Werror)
+endif()
+
+set(PATHSCOPE_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
+if(PATHSCOPE_SANITIZE)
+    set(sanitize -fsanitize=${PATHSCOPE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_compile_options(pathscope_flags INTERFACE ${sanitize})
+    target_link_options(pathscope_flags INTERFACE ${sanitize})
+    # Tests ask this where a figure depends on the sanitizer's slowness (time limits, sample counts).
+    target_compile_definitions(pathscope_flags INTERFACE PATHSCOPE_SANITIZED=1)
+endif()

@@ -1,0 +1,40 @@
+# pathscope_module(NAME USES other modules... LIBRARIES third-party targets...)
+#
+# One static library per module. USES is the module's row in docs/architecture.md; tools/check-house compares the
+# two. A module without .cpp files becomes an interface library, so that its users need not know.
+function(pathscope_module name)
+    cmake_parse_arguments(ARG "" "" "USES;LIBRARIES" ${ARGN})
+    set(target pathscope_${name})
+    file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
+    list(TRANSFORM ARG_USES PREPEND pathscope_ OUTPUT_VARIABLE modules)
+    if(sources)
+        add_library(${target} STATIC ${sources})
+        target_include_directories(${target} PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR}/src)
+        target_link_libraries(${target} PUBLIC ${modules} PRIVATE ${ARG_LIBRARIES} pathscope_flags)
+    else()
+        add_library(${target} INTERFACE)
+        target_include_directories(${target} INTERFACE ${PROJECT_SOURCE_DIR}/include)
+        target_link_libraries(${target} INTERFACE ${modules})
+    endif()
+    pathscope_module_tests(${name})
+endfunction()
+
+# tests/NAME/test_*.cpp become one doctest program, test_NAME.
+function(pathscope_module_tests name)
+    file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${name}/*.cpp)
+    if(sources AND BUILD_TESTING)
+        add_executable(test_${name} ${sources} ${PROJECT_SOURCE_DIR}/tests/main.cpp)
+        target_link_libraries(test_${name} PRIVATE pathscope_${name} pathscope_flags pathscope_test_support)
+        add_test(NAME ${name} COMMAND test_${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+    endif()
+endfunction()
+
+# tools/NAME/*.cpp become the program NAME in build/<preset>/bin.
+function(pathscope_program name)
+    cmake_parse_arguments(ARG "" "" "USES;LIBRARIES" ${ARGN})
+    file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/${name}/*.cpp)
+    list(TRANSFORM ARG_USES PREPEND pathscope_ OUTPUT_VARIABLE modules)
+    add_executable(${name} ${sources})
+    target_link_libraries(${name} PRIVATE ${modules} ${ARG_LIBRARIES} pathscope_flags)
+    set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+endfunction()

@@ -1,0 +1,20 @@
+#pragma once
+/// Whole files in, whole files out, each error as one sentence with the path in it.
+/// Thread safety: yes, for different paths.
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "pathscope/core/result.hpp"
+
+namespace pathscope {
+
+/// Refuses directories, missing and unreadable files.
+[[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path);
+
+/// Writes beside the target and renames, so that a reader sees the old file or the new one, never half of
+/// one. Makes no folders. Kind of error: bad_input when the place cannot be written to.
+[[nodiscard]] Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace pathscope

@@ -1,0 +1,23 @@
+#pragma once
+/// Sentences for people: notes and warnings on stderr, one line each.
+///
+/// A sink can be set (tests count warnings, the window shows them). Errors are not logged but returned
+/// (result.hpp). Thread safety: yes.
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace pathscope {
+
+enum class LogLevel { note, warning };
+
+using LogSink = std::function<void(LogLevel, std::string_view sentence)>;
+
+/// Replaces the sink; an empty one restores stderr. Returns the sink that was set before.
+LogSink set_log_sink(LogSink sink);
+
+void log_note(std::string_view sentence);
+void log_warning(std::string_view sentence);
+
+}  // namespace pathscope

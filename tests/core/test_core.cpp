@@ -1,0 +1,77 @@
+#include <filesystem>
+#include <set>
+
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/core/files.hpp"
+#include "pathscope/core/hash.hpp"
+#include "pathscope/core/log.hpp"
+#include "pathscope/core/result.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+
+namespace {
+enum class Fruit { apple, pear };
+constexpr std::array k_fruit_names{EnumName<Fruit>{Fruit::apple, "apple"},
+                                   EnumName<Fruit>{Fruit::pear, "pear"}};
+constexpr const auto& enum_table(Fruit) { return k_fruit_names; }
+}  // namespace
+
+TEST_CASE("a Result holds a value or a sentence") {
+    const Result<int> value = 7;
+    REQUIRE(bool(value));
+    CHECK(*value == 7);
+    const Result<int> error = bad_input("No such thing.");
+    REQUIRE_FALSE(bool(error));
+    CHECK(error.error().message == "No such thing.");
+    CHECK(error.error().kind == ErrorKind::bad_input);
+    CHECK(bool(Result<void>{}));
+    CHECK(Result<void>{failed("Broken.")}.error().kind == ErrorKind::failed);
+}
+
+TEST_CASE("enum names go both ways") {
+    CHECK(name_of(Fruit::pear) == "pear");
+    CHECK(from_name<Fruit>("apple") == Fruit::apple);
+    CHECK_FALSE(from_name<Fruit>("plum").has_value());
+    CHECK(joined_names<Fruit>() == "apple|pear");
+}
+
+TEST_CASE("hash_text is BLAKE2b-256") {
+    // RFC 7693 gives BLAKE2b-512 of "abc"; this is the 256-bit one, from the BLAKE2 reference program.
+    const std::string abc = "bddd813c634239723171ef3fee98579b94964e3bb1cb3e427262c8c068d52319";
+    CHECK(to_hex(hash_text("abc")) == abc);
+    Hasher parts;
+    parts.add("a");
+    parts.add("bc");
+    CHECK(to_hex(parts.finish()) == abc);
+    CHECK(digest_from_hex(abc) == hash_text("abc"));
+    CHECK_FALSE(digest_from_hex("xyz").has_value());
+    CHECK_FALSE(digest_from_hex(abc.substr(1) + "g").has_value());
+}
+
+TEST_CASE("files are written whole and read whole, errors name the path") {
+    const testing::TemporaryFolder temporary;
+    const std::filesystem::path& folder = temporary.path();
+    const auto path = folder / "a file.txt";
+    REQUIRE(bool(write_file_atomically(path, "first")));
+    REQUIRE(bool(write_file_atomically(path, "second")));
+    CHECK(*read_file(path) == "second");
+    CHECK(std::distance(std::filesystem::directory_iterator(folder), {}) == 1);
+
+    CHECK(read_file(folder).error().message.find("is a folder") != std::string::npos);
+    CHECK(read_file(folder / "none").error().message.find("none: No such file") != std::string::npos);
+    CHECK_FALSE(bool(write_file_atomically(folder / "no" / "x", "")));
+}
+
+TEST_CASE("a log sink receives what stderr would") {
+    std::string seen;
+    const LogSink before = set_log_sink([&](LogLevel level, std::string_view text) {
+        seen += level == LogLevel::warning ? "W:" : "N:";
+        seen += text;
+    });
+    log_note("a");
+    log_warning("b");
+    set_log_sink(before);
+    CHECK(seen == "N:aW:b");
+}
