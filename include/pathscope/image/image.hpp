@@ -28,9 +28,13 @@ struct Raster {
     std::vector<Pixel> pixels;
 
     Raster() = default;
+    /// Requires: width, height >= 0.
     Raster(int raster_width, int raster_height, Pixel fill = {})
-        : Raster(raster_width, raster_height,
-                 std::vector<Pixel>(std::size_t(raster_width) * std::size_t(raster_height), fill)) {}
+        : width(raster_width), height(raster_height) {
+        CHECK(width >= 0 && height >= 0, width, height);
+        pixels.assign(std::size_t(width) * std::size_t(height), fill);
+    }
+    /// Requires: as many values as pixels.
     Raster(int raster_width, int raster_height, std::vector<Pixel> values)
         : width(raster_width), height(raster_height), pixels(std::move(values)) {
         CHECK(width >= 0 && height >= 0 && pixels.size() == std::size_t(width) * std::size_t(height), width,
