@@ -1,0 +1,115 @@
+#pragma once
+/// The random numbers of one sample of one pixel: a pure function of (seed, x, y, sample, dimension).
+///
+/// Why: nothing is drawn, so nothing can be drawn in another order. Any sample of any pixel replays anywhere
+/// with the same bits, and the direct and the indirect pass of one sample share their numbers without either
+/// computing those of the other.
+///
+/// Dimensions: a dimension d names a *pair* of numbers. get_2d(d) gives both, get_1d(d) the first of them, so
+/// one number d serves one purpose: either as 1D or as 2D. Callers number their purposes 0, 1, 2, ... freely;
+/// unused numbers cost nothing.
+///
+/// Kinds:
+/// - independent: hashes; error falls with 1/sqrt(n) whatever the integrand.
+/// - sobol: each pair of each pixel is an Owen-scrambled (0,2)-sequence in the sample number. The first 2^k
+///   samples of a pair put exactly one point into every elementary interval of area 2^-k, so the error of
+///   smooth integrands falls nearly with 1/n^1.5. Pairs (and pixels) are decorrelated by visiting the
+///   sequence in differently scrambled order ("padding"), which keeps all of the above.
+///
+/// Units: floats uniform in [0, 1), multiples of 2^-24 (what tables of sampling/distribution.hpp count on).
+/// See:   Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4); the scramble's constants are those
+///        of Vegdahl 2021, "Building a Better LK Hash"; Laine & Karras 2011 had the idea.
+/// Thread safety: a value.   Test: tests/sampling/test_sampler.cpp
+
+#include <array>
+#include <cstdint>
+
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/math/random.hpp"
+#include "pathscope/math/vec.hpp"
+
+namespace pathscope {
+
+enum class SamplerKind : std::uint8_t { independent, sobol };
+inline constexpr std::array k_sampler_names{
+    EnumName<SamplerKind>{SamplerKind::independent, "independent"},
+    EnumName<SamplerKind>{SamplerKind::sobol, "sobol"},
+};
+constexpr const auto& enum_table(SamplerKind) { return k_sampler_names; }
+
+[[nodiscard]] constexpr std::uint32_t reverse_bits(std::uint32_t x) {
+    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
+    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    return __builtin_bswap32(x);
+}
+
+/// Owen's scramble of a number whose bits stand in reversed order: flips each bit by a hash of the bits below
+/// it. Every step is a sum or a product of x, and those carry only upwards.
+[[nodiscard]] constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t key) {
+    x ^= x * 0x3d20adeau;
+    x += key;
+    x *= (key >> 16) | 1;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return x;
+}
+
+/// The second coordinate of Sobol's sequence, bits reversed (the first, bits reversed, is the index itself).
+/// Its generator matrix is Pascal's triangle modulo 2: output bit i is the parity of all index bits j whose
+/// number contains i (Lucas: C(j, i) is odd iff the bits of i are among those of j). That parity over
+/// supersets takes one step for each of the five bits of j, not one for each j.
+[[nodiscard]] constexpr std::uint32_t sobol_second_reversed(std::uint32_t index) {
+    index ^= (index & 0xffff0000u) >> 16;
+    index ^= (index & 0xff00ff00u) >> 8;
+    index ^= (index & 0xf0f0f0f0u) >> 4;
+    index ^= (index & 0xccccccccu) >> 2;
+    index ^= (index & 0xaaaaaaaau) >> 1;
+    return index;
+}
+
+class PixelSampler {
+  public:
+    PixelSampler(SamplerKind kind, std::uint32_t seed, int x, int y, std::uint32_t sample)
+        : kind_(kind), sample_(sample) {
+        pixel_key_ = hash_combine(hash_combine(hash_u32(seed), std::uint32_t(x)), std::uint32_t(y));
+    }
+
+    [[nodiscard]] float get_1d(std::uint32_t dimension) const {
+        const std::uint32_t key = hash_combine(pixel_key_, dimension);
+        if (kind_ == SamplerKind::independent) return to_unit_float(hash_combine(key, sample_));
+        return sobol_first(shuffled_index(key), key);
+    }
+
+    [[nodiscard]] Vec2 get_2d(std::uint32_t dimension) const {
+        const std::uint32_t key = hash_combine(pixel_key_, dimension);
+        if (kind_ == SamplerKind::independent) {
+            const std::uint32_t first = hash_combine(key, sample_);
+            return {to_unit_float(first), to_unit_float(hash_combine(first, k_second_salt))};
+        }
+        const std::uint32_t index = shuffled_index(key);
+        return {sobol_first(index, key), sobol_second(index, key)};
+    }
+
+  private:
+    static constexpr std::uint32_t k_second_salt = 0x68bc21ebu;
+    static constexpr std::uint32_t k_first_salt = 0x02e5be93u;
+
+    /// Permutes the samples so that the first 2^k of them stay an aligned run of the sequence, for every k.
+    [[nodiscard]] std::uint32_t shuffled_index(std::uint32_t key) const {
+        return reverse_bits(scramble_reversed(reverse_bits(sample_), key));
+    }
+    [[nodiscard]] static float sobol_first(std::uint32_t index, std::uint32_t key) {
+        return to_unit_float(reverse_bits(scramble_reversed(index, hash_combine(key, k_first_salt))));
+    }
+    [[nodiscard]] static float sobol_second(std::uint32_t index, std::uint32_t key) {
+        const std::uint32_t reversed = sobol_second_reversed(index);
+        return to_unit_float(reverse_bits(scramble_reversed(reversed, hash_combine(key, k_second_salt))));
+    }
+
+    SamplerKind kind_;
+    std::uint32_t sample_;
+    std::uint32_t pixel_key_;
+};
+
+}  // namespace pathscope
