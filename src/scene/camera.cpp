@@ -57,17 +57,19 @@ std::optional<Vec2> project_point(const CameraFrame& camera, Vec3 point) {
                 dot(on_plane, camera.step_y) / length_squared(camera.step_y)};
 }
 
-Camera camera_that_sees(const Box& bounds, float aspect) {
+Camera camera_that_sees(const Box& bounds, Vec3 up, float aspect) {
     CHECK(aspect > 0, aspect);
     Camera camera;
     if (bounds.empty()) return camera;
+    camera.up = up;
     const float extent = length(bounds.extent());
     const float radius = extent > 0 ? extent / 2 : 1;
 
     // The narrower of the two opening angles decides how far away the sphere fits.
     const float half_height = std::tan(radians(camera.vfov_deg) / 2);
     const float half_angle = std::atan(half_height * std::min(1.0f, aspect));
-    const Vec3 from_centre = normalize(Vec3{0.1f, 0.15f, 1});
+    const Vec3 right{1, 0, 0}, front = cross(right, up);
+    const Vec3 from_centre = normalize(0.1f * right + 0.15f * up + front);
     camera.look_at = bounds.centre();
     camera.position = camera.look_at + from_centre * (radius / std::sin(half_angle));
     return camera;

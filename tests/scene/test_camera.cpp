@@ -62,25 +62,34 @@ TEST_CASE("projecting a point of a camera ray gives its pixel back") {
     CHECK_FALSE(project_point(camera, camera.position - camera.forward));
 }
 
-TEST_CASE("a camera that sees a box has all its corners in the image, at any scale and aspect") {
+namespace {
+
+/// Whether every corner of the box lies within a width x height image.
+bool sees_all(const Camera& view, const Box& box, int width, int height) {
+    const CameraFrame camera = make_camera(view, width, height);
+    for (int i = 0; i < 8; ++i) {
+        const Vec3 corner{i & 1 ? box.low.x : box.high.x, i & 2 ? box.low.y : box.high.y,
+                          i & 4 ? box.low.z : box.high.z};
+        const auto pixel = project_point(camera, corner);
+        if (!pixel || pixel->x < 0 || pixel->y < 0) return false;
+        if (pixel->x > float(width) || pixel->y > float(height)) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("a camera that sees a box has all its corners in the image, at any scale, aspect and up") {
     for (const float scale : {1e-4f, 1.0f, 1e5f}) {
-        for (const float aspect : {0.5f, 1.0f, 2.0f}) {
-            Box box;
-            box.add(Vec3{-1, 0, 2} * scale);
-            box.add(Vec3{5, 0, 3} * scale);
-            const Camera view = camera_that_sees(box, aspect);
-            REQUIRE(check_camera(view));
-            const int width = int(100 * aspect);
-            const CameraFrame camera = make_camera(view, width, 100);
-            for (int corner = 0; corner < 8; ++corner) {
-                const Vec3 point{corner & 1 ? box.low.x : box.high.x, corner & 2 ? box.low.y : box.high.y,
-                                 corner & 4 ? box.low.z : box.high.z};
-                const auto pixel = project_point(camera, point);
-                REQUIRE(pixel);
-                CHECK(pixel->x > 0);
-                CHECK(pixel->x < float(width));
-                CHECK(pixel->y > 0);
-                CHECK(pixel->y < 100);
+        Box box;
+        box.add(Vec3{-1, 0, 2} * scale);
+        box.add(Vec3{5, 0, 3} * scale);
+        for (const Vec3 up : {Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
+            for (const float aspect : {0.5f, 1.0f, 2.0f}) {
+                const Camera view = camera_that_sees(box, up, aspect);
+                REQUIRE(check_camera(view));
+                CHECK(sees_all(view, box, int(100 * aspect), 100));
+                CHECK(dot(view.position - view.look_at, up) > 0);
             }
         }
     }
