@@ -1,0 +1,283 @@
+#pragma once
+/// The ledger: the client's exactly-once account of rounds.
+///
+/// The work of an epoch is a number of units (with strategy `blocks` a unit is a block of pixels; the ledger does
+/// not know). Each unit needs the samples [0, samples) once, cut into rounds of round_samples; the last may
+/// be shorter. A round is *granted* to a server as a lease with a deadline, and *committed* by the first result
+/// that fits, or granted again when the lease ends without one:
+///
+///                 grant                       commit
+///        fresh  --------->  held by 1..2  -------------->  committed
+///                            |      ^
+///            expire, revoke, |      | grant
+///            release         v      |        commit (a late result is welcome)
+///                            reopened  ----------------->  committed
+///
+/// Invariants, which audit() recomputes from the records at any moment:
+///   rounds    each is committed at most once; when complete(), exactly once
+///   leases    granted = outstanding + returned + superseded + released + expired + revoked + dropped
+///   results   received = accepted + duplicates + stale + unknown + mismatched
+///   between   accepted = returned + late;  committed = accepted + restored
+///   bounded   records exist only for rounds that were granted and are not committed, at most
+///             k_leases_per_round each; a committed round is remembered by what is *absent*
+///
+/// How a duplicate is known without a record of it: a unit's rounds are first granted in rising order, so
+/// `index < fresh` means "was granted", and without a record, "is committed".
+///
+/// No socket, no clock (`now` is an argument and never falls). What is decided is written to the event store with
+/// its reason, if there is one. Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
+/// Thread safety: one thread at a time.
+/// Test: tests/cluster/test_ledger.cpp, test_simulation.cpp
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "pathscope/core/clock.hpp"
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/core/ids.hpp"
+#include "pathscope/core/result.hpp"
+#include "pathscope/probe/event_store.hpp"
+
+namespace pathscope {
+
+/// As many samples as one exact sum can hold: "until stop()".
+inline constexpr std::uint32_t k_open_ended = 1u << 20;
+
+struct LedgerPlan {
+    Epoch epoch;
+    std::uint32_t units = 0;
+    std::uint32_t samples = 0;        ///< Per unit; k_open_ended to go on until stop().
+    std::uint32_t round_samples = 1;  ///< At least 1.
+
+    [[nodiscard]] bool open_ended() const { return samples == k_open_ended; }
+    [[nodiscard]] std::uint32_t rounds_per_unit() const {
+        return samples / round_samples + (samples % round_samples != 0 ? 1 : 0);
+    }
+};
+
+/// Round `index` of `unit`.
+struct RoundKey {
+    std::uint32_t unit = 0;
+    std::uint32_t index = 0;
+    auto operator<=>(const RoundKey&) const = default;
+};
+
+struct SampleRange {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    bool operator==(const SampleRange&) const = default;
+};
+
+/// Requires: index < plan.rounds_per_unit().
+[[nodiscard]] SampleRange samples_of_round(const LedgerPlan& plan, std::uint32_t index);
+
+/// A round granted to one server until a deadline.
+struct Lease {
+    LeaseId id;
+    Epoch epoch;
+    std::uint32_t unit = 0;
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    ServerId server;
+    TimeNs granted = 0;
+    TimeNs deadline = 0;
+    bool copy = false;  ///< A second lease on a straggler's round.
+};
+
+/// What a result says it is; the ledger believes nothing of it.
+struct ResultClaim {
+    LeaseId lease;
+    Epoch epoch;
+    std::uint32_t unit = 0;
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    ServerId server;  ///< From the connection it came by, not from the message.
+};
+
+enum class Verdict {
+    accepted,     ///< Merge it: the first result of its round.
+    duplicate,    ///< The round was committed already.
+    stale_epoch,  ///< Of an old epoch.
+    unknown,      ///< No such lease was granted, or so long ago that it is forgotten.
+    mismatched,   ///< Another unit, range or server than its lease says.
+};
+
+inline constexpr std::array k_verdict_names{
+    EnumName{Verdict::accepted, "accepted"},       EnumName{Verdict::duplicate, "duplicate"},
+    EnumName{Verdict::stale_epoch, "stale_epoch"}, EnumName{Verdict::unknown, "unknown"},
+    EnumName{Verdict::mismatched, "mismatched"},
+};
+constexpr const auto& enum_table(Verdict) { return k_verdict_names; }
+
+struct Commit {
+    Verdict verdict = Verdict::unknown;
+    bool late = false;              ///< Accepted after its lease had ended.
+    TimeNs since_grant = 0;         ///< Of an accepted one.
+    std::vector<Lease> superseded;  ///< Leases of the same round that nobody needs any more: cancel them.
+};
+
+/// Everything that was ever counted, over all epochs.
+struct LedgerCounts {
+    // Leases: each granted one is outstanding or has met exactly one of these ends.
+    std::uint64_t granted = 0;
+    std::uint64_t returned = 0;    ///< Its result was accepted in time.
+    std::uint64_t superseded = 0;  ///< Another's result was first.
+    std::uint64_t released = 0;
+    std::uint64_t expired = 0;
+    std::uint64_t revoked = 0;
+    std::uint64_t dropped = 0;  ///< Its epoch ended.
+    // Results: each received one is counted once.
+    std::uint64_t accepted = 0;
+    std::uint64_t duplicates = 0;
+    std::uint64_t stale = 0;
+    std::uint64_t unknown = 0;
+    std::uint64_t mismatched = 0;
+    // Among them.
+    std::uint64_t late = 0;         ///< Accepted after the lease had ended.
+    std::uint64_t reallocated = 0;  ///< Granted again, to another server than the last.
+    std::uint64_t copied = 0;       ///< Granted as a second lease.
+};
+
+/// What a checkpoint keeps of a unit: the rounds [0, reached) are committed, except the missing ones.
+struct UnitSnapshot {
+    std::uint32_t reached = 0;
+    std::vector<std::uint32_t> missing;  ///< Rising.
+};
+
+class Ledger {
+  public:
+    static constexpr std::size_t k_leases_per_round =
+        8;  ///< Remembered; beyond, the newest ended one is forgotten.
+    static constexpr std::size_t k_copies_per_round = 2;  ///< Held at once.
+
+    /// The store is where decisions and counters go; it may be null, and must outlive the ledger.
+    explicit Ledger(EventStore* store = nullptr) : store_(store) {}
+
+    /// Starts an account; everything of older epochs is dropped. Returns the leases that were outstanding.
+    /// Requires: plan.epoch above the epoch before; samples <= k_open_ended.
+    std::vector<Lease> new_epoch(const LedgerPlan& plan, TimeNs now);
+
+    /// Takes over what a checkpoint says is committed. Returns an error if it does not fit the plan.
+    /// Requires: nothing of this unit was granted or restored before.
+    [[nodiscard]] Result<void> restore(std::uint32_t unit, const UnitSnapshot& committed);
+    [[nodiscard]] UnitSnapshot snapshot(std::uint32_t unit) const;
+
+    /// No more grants; results of leases already granted are still welcome.
+    void stop() { stopped_ = true; }
+
+    /// Grants an open round: a reopened one, or the unit's next fresh one. Returns nothing if it is not open.
+    /// Requires: duration > 0.
+    std::optional<Lease> grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
+
+    /// Grants a round that another server holds, so that the quicker one counts. Returns nothing unless exactly
+    /// one other server holds it.
+    std::optional<Lease> grant_copy(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
+
+    /// What commit() would answer: lets a session refuse before it decodes, and decode before it commits.
+    [[nodiscard]] Verdict judge(const ResultClaim& claim) const;
+
+    /// Books a result. The caller merges it if and only if the verdict is `accepted`.
+    Commit commit(const ResultClaim& claim, TimeNs now);
+
+    /// Ends the leases whose deadline is at or before now, and reopens their rounds.
+    std::vector<Lease> expire(TimeNs now);
+
+    /// Ends the leases of a server that died or left, and reopens their rounds.
+    std::vector<Lease> revoke(ServerId server, TimeNs now);
+
+    /// Ends one lease that its server gave back, or whose result could not be used. Returns nothing if the server
+    /// does not hold it.
+    std::optional<Lease> release(LeaseId lease, ServerId server, TimeNs now);
+
+    // -- View (schedules, panels, statistics) ---------------------------------------------------------------
+    [[nodiscard]] const LedgerPlan& plan() const { return plan_; }
+    [[nodiscard]] bool stopped() const { return stopped_; }
+
+    /// Nothing is left to wait for: all rounds are committed or, after stop(), no lease is outstanding.
+    [[nodiscard]] bool complete() const;
+
+    /// The unit's lowest round that was never granted.
+    [[nodiscard]] std::optional<RoundKey> next_fresh(std::uint32_t unit) const;
+
+    /// Rounds whose leases ended without a result, in that order: to be given out before any fresh one.
+    [[nodiscard]] const std::deque<RoundKey>& reopened() const { return reopened_; }
+
+    /// How often the round was granted so far; 0 for a fresh or a committed one. For longer leases each time.
+    [[nodiscard]] std::uint32_t attempts(RoundKey round) const;
+
+    /// Outstanding leases by rising id, that is, oldest first.
+    [[nodiscard]] std::vector<Lease> outstanding_leases() const;
+    [[nodiscard]] std::size_t outstanding() const { return outstanding_; }
+    [[nodiscard]] std::size_t outstanding(ServerId server) const;
+    [[nodiscard]] std::optional<Lease> find(LeaseId lease) const;  ///< Outstanding ones only.
+
+    /// The next moment at which expire() has something to do.
+    [[nodiscard]] std::optional<TimeNs> next_deadline() const;
+
+    [[nodiscard]] std::uint64_t rounds() const;  ///< Planned in this epoch; open-ended: begun.
+    [[nodiscard]] std::uint64_t rounds_committed() const { return committed_; }
+    [[nodiscard]] std::uint32_t samples_committed(std::uint32_t unit) const {
+        return units_.at(unit).samples;
+    }
+    [[nodiscard]] ServerId last_owner(std::uint32_t unit) const { return units_.at(unit).owner; }
+    [[nodiscard]] const LedgerCounts& counts() const { return counts_; }
+
+    /// Recomputes every invariant above from the records; an error is a bug, and says which one broke.
+    [[nodiscard]] Result<void> audit() const;
+
+  private:
+    struct Unit {
+        std::uint32_t fresh = 0;    ///< Rounds [0, fresh) were granted or restored.
+        std::uint32_t samples = 0;  ///< Committed.
+        ServerId owner;             ///< Of the newest lease.
+    };
+    struct Record {
+        Lease lease;
+        bool outstanding = true;
+    };
+    /// A round that was granted and is not committed.
+    struct Active {
+        std::vector<LeaseId> leases;  ///< Outstanding and ended ones, rising.
+        std::uint32_t attempts = 0;
+        std::uint32_t holders = 0;  ///< Outstanding ones among `leases`; 0: the round is reopened.
+        ServerId last_holder;
+    };
+
+    [[nodiscard]] bool committed(RoundKey round) const;
+    [[nodiscard]] RoundKey key_of(const Lease& lease) const {
+        return {lease.unit, lease.first / plan_.round_samples};
+    }
+    Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration, bool copy);
+    void end_lease(Record& record);
+    void end_and_reopen(Record& record, UnitReason reason, TimeNs now);
+    void forget_oldest_ended(Active& active);
+    void count_verdict(Verdict verdict, const ResultClaim& claim, TimeNs now);
+    void note(const Lease& lease, UnitChange change, UnitReason reason, TimeNs now,
+              ServerId previous = {}) const;
+    void count(Counter counter, std::uint64_t n, ServerId server) const;
+
+    EventStore* store_;
+    LedgerPlan plan_;
+    bool stopped_ = false;
+    std::vector<Unit> units_;
+    std::map<RoundKey, Active> active_;
+    std::map<LeaseId, Record> records_;
+    std::set<std::pair<TimeNs, LeaseId>> deadlines_;  ///< Of outstanding leases.
+    std::map<ServerId, std::uint32_t> held_;          ///< Outstanding leases by server, no zeros.
+    std::deque<RoundKey> reopened_;
+    std::size_t outstanding_ = 0;
+    std::uint64_t committed_ = 0;  ///< Rounds of this epoch.
+    std::uint64_t begun_ = 0;
+    std::uint64_t restored_ = 0;
+    std::uint64_t accepted_before_ = 0;  ///< counts_.accepted when this epoch began.
+    std::uint64_t last_lease_ = 0;
+    std::uint64_t last_lease_before_ = 0;  ///< last_lease_ when this epoch began.
+    LedgerCounts counts_;
+};
+
+}  // namespace pathscope
