@@ -1,0 +1,29 @@
+#pragma once
+/// The ZeroMQ context: the I/O threads that move messages, and the namespace of inproc:// addresses.
+///
+/// One per process is the rule. Sockets keep their context alive, so that the order in which a context and its
+/// sockets go out of scope does not matter: the last one to go waits for what linger allows to be sent.
+/// Thread safety: yes.   Test: tests/net/test_sockets.cpp
+
+#include <memory>
+
+namespace pathscope {
+
+struct ContextOptions {
+    int io_threads = 1;  ///< One moves about 1 GB/s.
+    int max_sockets =
+        4096;  ///< Sockets in this process, of inproc peers too; TCP peers of one socket do not count.
+};
+
+class Context {
+  public:
+    explicit Context(const ContextOptions& options = {});
+
+    /// Only for sockets of this module: the ZeroMQ handle.
+    [[nodiscard]] const std::shared_ptr<void>& handle() const { return handle_; }
+
+  private:
+    std::shared_ptr<void> handle_;
+};
+
+}  // namespace pathscope
