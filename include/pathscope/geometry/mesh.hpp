@@ -1,0 +1,78 @@
+#pragma once
+/// The scene's surfaces: one indexed triangle mesh.
+///
+/// A triangle is three indices into `positions`; normals and texture coordinates, where a scene has them, lie at
+/// the same index. `normals` and `uvs` are empty or as long as `positions`; a vertex with the normal (0, 0, 0) has
+/// none, and the geometric normal takes its place there. `materials` is empty (all 0) or one id per triangle.
+///
+/// Convention: the geometric normal is on the side from which a, b, c run counter-clockwise.
+/// Units: scene units; nothing here has an absolute tolerance, scenes differ by a factor of 100,000 in size.
+/// Requires: validate() passed; the scene loader calls it, all other code relies on it.
+/// Thread safety: values.   Test: tests/geometry/test_mesh.cpp
+
+#include <cstdint>
+#include <vector>
+
+#include "pathscope/core/result.hpp"
+#include "pathscope/math/box.hpp"
+#include "pathscope/math/vec.hpp"
+
+namespace pathscope {
+
+struct TriangleIndices {
+    std::uint32_t a = 0, b = 0, c = 0;
+
+    friend bool operator==(const TriangleIndices&, const TriangleIndices&) = default;
+};
+
+struct Mesh {
+    std::vector<Vec3> positions;
+    std::vector<Vec3> normals;  ///< Empty or per vertex; (0, 0, 0) = none at this vertex.
+    std::vector<Vec2> uvs;      ///< Empty or per vertex.
+    std::vector<TriangleIndices> triangles;
+    std::vector<std::uint32_t> materials;  ///< Empty (all 0) or per triangle.
+
+    [[nodiscard]] std::uint32_t triangle_count() const {
+        return static_cast<std::uint32_t>(triangles.size());
+    }
+    [[nodiscard]] std::uint32_t material_of(std::uint32_t triangle) const {
+        return materials.empty() ? 0 : materials[triangle];
+    }
+};
+
+struct TriangleCorners {
+    Vec3 a, b, c;
+
+    /// (1 - u - v) a + u b + v c
+    [[nodiscard]] Vec3 at(float u, float v) const { return a * (1 - u - v) + b * u + c * v; }
+};
+
+[[nodiscard]] inline TriangleCorners corners(const Mesh& mesh, std::uint32_t triangle) {
+    const TriangleIndices& i = mesh.triangles[triangle];
+    return {mesh.positions[i.a], mesh.positions[i.b], mesh.positions[i.c]};
+}
+
+/// True if the corners lie on one line or in one point: no area, no normal, never hit.
+[[nodiscard]] bool is_degenerate(const TriangleCorners& triangle);
+
+/// Of length one; the zero vector for a degenerate triangle. Computed in double, so that slivers and scenes of
+/// any size have one.
+[[nodiscard]] Vec3 geometric_normal(const TriangleCorners& triangle);
+
+[[nodiscard]] float area(const TriangleCorners& triangle);
+
+[[nodiscard]] inline Box bounds(const TriangleCorners& triangle) {
+    Box box;
+    box.add(triangle.a);
+    box.add(triangle.b);
+    box.add(triangle.c);
+    return box;
+}
+
+/// Of all triangles; positions that no triangle uses do not count.
+[[nodiscard]] Box bounds(const Mesh& mesh);
+
+/// Checks the rules above, and that every number is finite. The sentence names the triangle or the vertex.
+[[nodiscard]] Result<void> validate(const Mesh& mesh);
+
+}  // namespace pathscope

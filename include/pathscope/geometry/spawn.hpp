@@ -1,0 +1,58 @@
+#pragma once
+/// Rays that leave a surface without hitting it again.
+///
+/// A stored position lies within its error box e around the true point, on either side of the surface. Along the
+/// geometric normal n the box reaches D = sum_i |n_i| e_i, so the origin is moved by
+///
+///     k D,   k = 4:   one D for the position, one for rounding the moved origin to float,
+///                     two to spare, against the 2^-50 or so by which the triangle test errs
+///
+/// to the side that the direction points to. This is an offset of a few units in the last place at any scale of scene
+/// and any distance from the origin of space: no epsilon to tune, no t_min. The same margin clears coincident
+/// copies of the triangle: they lie in the same plane. Use the geometric normal, never the shading
+/// normal: only the former knows where the surface is.
+///
+/// A shadow ray has two ends to keep clear: its target is moved off the light's surface in the same way, by an
+/// error that includes the rounding of the direction, and t_max stops 2^-21 of the distance short of it.
+///
+/// Ensures: direction of length one. Thread safety: pure.
+/// Reference: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., section 6.8.6.
+/// Test: tests/geometry/test_spawn.cpp (no self-hit at sizes 1e-3, 1, 1e5, also 1000 sizes from the origin)
+
+#include "pathscope/geometry/hit.hpp"
+#include "pathscope/math/ray.hpp"
+
+namespace pathscope {
+
+inline constexpr float k_offset_safety = 4;
+
+/// Moves a position off the surface that it lies on, to the side that `direction` points to. Requires: normal of
+/// length one; error >= 0, with the rounding of the position itself included (hit.hpp).
+[[nodiscard]] inline Vec3 offset_origin(Vec3 position, Vec3 error, Vec3 geometric_normal, Vec3 direction) {
+    const float distance = k_offset_safety * dot(abs(geometric_normal), error);
+    return position + geometric_normal * (dot(direction, geometric_normal) >= 0 ? distance : -distance);
+}
+
+/// Requires: direction of length one.
+[[nodiscard]] inline Ray spawn_ray(const SurfacePoint& point, Vec3 direction) {
+    return {offset_origin(point.position, point.position_error, point.geometric_normal, direction),
+            direction};
+}
+
+/// A point to aim at: on a light, or any other surface.
+struct RayTarget {
+    Vec3 position;
+    Vec3 position_error;
+    Vec3
+        normal;  ///< Geometric, of length one, either side; zero if there is no surface (nothing to keep clear of).
+};
+
+/// The segment between the two surfaces, for visibility: whatever it hits stands between them. Where the two are
+/// closer than their errors the segment is empty (t_max < t_min) and nothing stands between.
+[[nodiscard]] Ray spawn_ray_to(const SurfacePoint& point, const RayTarget& target);
+
+[[nodiscard]] inline Ray spawn_ray_to(const SurfacePoint& point, const SurfacePoint& target) {
+    return spawn_ray_to(point, RayTarget{target.position, target.position_error, target.geometric_normal});
+}
+
+}  // namespace pathscope
