@@ -23,7 +23,7 @@
 /// 2004, "Flash Photography Enhancement via Intrinsic Relighting"; Petschnigg et al. 2004,
 ///         "Digital Photography with Flash and No-Flash Image Pairs"; Tomasi & Manduchi 1998, "Bilateral
 ///         Filtering".
-/// Thread safety: yes.   Test: tests/filter/test_joint_bilateral.cpp   Lesson: lessons/10-bilateral-filter
+/// Thread safety: yes.   Test: tests/filter/test_joint_bilateral.cpp
 
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/image.hpp"
@@ -39,11 +39,10 @@ struct Guides {
 
 /// A sigma of infinity switches its term off.
 struct BilateralParams {
-    int radius = 7;  ///< In pixels; 0 returns the picture unchanged.
-    float sigma_spatial =
-        3.5f;  ///< In pixels; at half the radius, 1 - 0.95 of the Gaussian's area is cut off.
-    float sigma_normal = 0.2f;  ///< 0.2 is an angle of 11 degrees.
-    float sigma_depth = 0.05f;  ///< 0.05 is 5 % of the depth.
+    int radius = 7;              ///< In pixels; 0 returns the picture unchanged.
+    float sigma_spatial = 3.5f;  ///< In pixels; half the radius keeps 95 % of the Gaussian in each direction.
+    float sigma_normal = 0.2f;   ///< 0.2 is an angle of 11 degrees.
+    float sigma_depth = 0.05f;   ///< 0.05 is 5 % of the depth.
     float sigma_albedo = 0.1f;
     bool demodulate_albedo = false;  ///< Requires the guide.
 

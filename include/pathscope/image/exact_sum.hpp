@@ -12,9 +12,9 @@
 /// Range:   a sample holds at most 2^43 - 1 quanta and a pixel 2^20 samples, so a sum stays below 2^63.
 /// Error:   |mean - true mean of the samples| <= q / 2, besides the rounding of the result to float (2^-24 of
 /// it).
-///          With quantum_for, q / 2 is 2^-33 of a typical pixel: 500 times finer than the float it ends in.
-///          Only where the brightest emitter is over 2^8 times brighter than a typical pixel does it set q:
-///          then q / 2 is 2^-41 of that emitter.
+///          With quantum_for, q / 2 is below 2^-32 of a typical pixel: 256 times finer than the float it ends in.
+///          Only where the brightest emitter is over 2^8 times brighter than a typical pixel does it set q: then
+///          q / 2 is below 2^-40 of that emitter.
 /// Beyond:  a sample of more than 2^43 - 1 quanta (8 times the brightest emitter and 2,048 times a typical
 /// pixel, at
 ///          least) is clamped to that, and `saturated` is set for the caller to count and report.
