@@ -71,13 +71,18 @@ Imf::Slice slice_of(const float* first, int pixel_floats, const Imath::Box2i& wi
 
 constexpr const char* k_rgb_names[3] = {"R", "G", "B"};
 
+void add_channel(const std::string& name, const float* first, int pixel_floats, Imf::Header& header,
+                 Imf::FrameBuffer& frame) {
+    CHECK(header.channels().findChannel(name) == nullptr, name);
+    header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+    frame.insert(name, slice_of(first, pixel_floats, header.dataWindow()));
+}
+
 void add_channels(const std::string& prefix, const Image& image, Imf::Header& header,
                   Imf::FrameBuffer& frame) {
     static_assert(sizeof(Rgb) == 3 * sizeof(float));
-    for (int c = 0; c < 3; ++c) {
-        header.channels().insert(prefix + k_rgb_names[c], Imf::Channel(Imf::FLOAT));
-        frame.insert(prefix + k_rgb_names[c], slice_of(&image.pixels[0].x + c, 3, header.dataWindow()));
-    }
+    for (int c = 0; c < 3; ++c)
+        add_channel(prefix + k_rgb_names[c], &image.pixels[0].x + c, 3, header, frame);
 }
 
 std::string write_exr(std::span<const ImageLayer> layers, const Metadata& metadata) {
