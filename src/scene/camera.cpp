@@ -7,7 +7,8 @@
 namespace pathscope {
 namespace {
 
-float radians(float degrees) { return degrees * (k_pi / 180); }
+/// tan(angle / 2); in double, so that after rounding every libm gives the same float.
+float tangent_of_half(double degrees) { return float(std::tan(degrees * (3.14159265358979323846 / 360))); }
 
 /// Sine of the smallest angle between up and the view that still says where up is.
 constexpr float k_least_sine = 1e-4f;
@@ -36,7 +37,7 @@ CameraFrame make_camera(const Camera& view, int width, int height) {
     const Vec3 right = normalize(cross(forward, view.up));
     const Vec3 down = cross(forward, right);
 
-    const float pixel = 2 * std::tan(radians(view.vfov_deg) / 2) / float(height);
+    const float pixel = 2 * tangent_of_half(view.vfov_deg) / float(height);
     CameraFrame camera;
     camera.position = view.position;
     camera.forward = forward;
@@ -66,7 +67,7 @@ Camera camera_that_sees(const Box& bounds, Vec3 up, float aspect) {
     const float radius = extent > 0 ? extent / 2 : 1;
 
     // The narrower of the two opening angles decides how far away the sphere fits.
-    const float half_height = std::tan(radians(camera.vfov_deg) / 2);
+    const float half_height = tangent_of_half(camera.vfov_deg);
     const float half_angle = std::atan(half_height * std::min(1.0f, aspect));
     const Vec3 right{1, 0, 0}, front = cross(right, up);
     const Vec3 from_centre = normalize(0.1f * right + 0.15f * up + front);

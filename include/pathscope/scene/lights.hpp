@@ -1,0 +1,126 @@
+#pragma once
+/// The lights of a scene in the form that sampling needs, and the table that picks one of them.
+///
+///   Lr ≈ f Le cos θ / (P(light) pdf(direction | light))
+///
+/// is one sample of the light that a point reflects. This header holds the lights and P(light); the densities of
+/// directions are in light_sampling.hpp. There are two ways to pick, for lessons to compare; both converge to the
+/// same image:
+///   area   the textbook: all emitting surface of the scene is one light, sampled uniformly, pdf_area = 1 / A.
+///          Lights without area (point, sun, sky, environment) get equal shares beside it: where there are k of
+///          them each is picked with probability 1 / (k + 1), and the surface with the rest.
+///   power  each light in proportion to the power that it sends out; light from infinity sends what falls on the
+///          disc that just covers the scene.
+/// Units: radiance W/(m² sr), intensity W/sr, irradiance W/m², each as linear Rgb. Powers are luminances of W.
+/// See: for area, Y. Huang, "A Distributed Path Tracer"; for power, Shirley, Wang & Zimmerman 1996, "Monte Carlo
+/// Techniques for Direct Lighting Calculations".
+/// Thread safety: values, read only once finished.
+/// Test: tests/scene/test_lights.cpp     Lesson: lessons/04-light-sampling
+
+#include <array>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/math/vec.hpp"
+#include "pathscope/sampling/distribution.hpp"
+#include "pathscope/scene/environment.hpp"
+
+namespace pathscope {
+
+enum class LightSampling : std::uint8_t { area, power };
+inline constexpr std::array k_light_sampling_names{
+    EnumName{LightSampling::area, "area"},
+    EnumName{LightSampling::power, "power"},
+};
+constexpr const auto& enum_table(LightSampling) { return k_light_sampling_names; }
+
+/// A triangle of the mesh whose material emits. Quads are two of them.
+struct TriangleLight {
+    std::uint32_t triangle = 0;
+    float area = 0;
+    Rgb mean_radiance;      ///< For its power; emission itself is looked up at each point (map_ke, cut-outs).
+    bool two_sided = true;  ///< Otherwise it emits on the side of its normal only.
+};
+
+/// A sphere that emits the same radiance everywhere, outwards, and is black inside.
+struct SphereLight {
+    std::uint32_t sphere = 0;  ///< In Scene::spheres.
+    float radius = 1;
+    Rgb radiance;
+};
+
+struct PointLight {
+    Vec3 position;
+    Rgb intensity;  ///< Irradiance at distance r, on a plane that faces the light, is intensity / r².
+};
+
+/// A disc at infinity: all directions within half of its angular diameter of to_sun. Of angle 0 it is a single
+/// direction, which only light sampling finds.
+struct SunLight {
+    Vec3 to_sun{0, 1, 0};     ///< Length one.
+    Rgb irradiance;           ///< On a plane that faces the sun.
+    Rgb radiance;             ///< irradiance / (π sin²(half angle)); zero for angle 0.
+    float one_minus_cos = 0;  ///< 1 - cos(half angle): see sample_cone() for why not the cosine.
+
+    [[nodiscard]] bool is_delta() const { return one_minus_cos == 0; }
+};
+
+/// Requires: to_sun not zero; angle_deg, the angular diameter, in [0, 180].
+[[nodiscard]] SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg);
+
+/// Whether the disc covers a direction of length one. Never, for a delta.
+[[nodiscard]] bool sun_covers(const SunLight& sun, Vec3 direction);
+
+/// The same radiance from all directions.
+struct SkyLight {
+    Rgb radiance;
+};
+
+struct EnvironmentLight {
+    std::uint32_t map = 0;  ///< In LightTable::environments.
+};
+
+using Light = std::variant<TriangleLight, SphereLight, PointLight, SunLight, SkyLight, EnvironmentLight>;
+
+/// Names of the kinds, in the order of Light: for path tables and statistics.
+enum class LightKind : std::uint8_t { triangle, sphere, point, sun, sky, environment };
+inline constexpr std::array k_light_kind_names{
+    EnumName{LightKind::triangle, "triangle"}, EnumName{LightKind::sphere, "sphere"},
+    EnumName{LightKind::point, "point"},       EnumName{LightKind::sun, "sun"},
+    EnumName{LightKind::sky, "sky"},           EnumName{LightKind::environment, "environment"},
+};
+constexpr const auto& enum_table(LightKind) { return k_light_kind_names; }
+
+[[nodiscard]] inline LightKind light_kind(const Light& light) { return LightKind(light.index()); }
+
+inline constexpr std::uint32_t k_no_light = 0xffffffffu;
+
+struct LightTable {
+    std::vector<Light> lights;
+    std::vector<EnvironmentMap> environments;
+    std::vector<std::uint32_t> of_triangle;  ///< Of each mesh triangle, or k_no_light; empty if none emits.
+    std::vector<std::uint32_t> of_sphere;    ///< Of each of Scene::spheres.
+    std::vector<std::uint32_t> infinite;     ///< Those that a ray may see which leaves the scene: no deltas.
+    std::array<Distribution1d, 2> pick;      ///< Over `lights`, by LightSampling; nothing without lights.
+
+    [[nodiscard]] bool empty() const { return lights.empty(); }
+};
+
+/// Luminance of the power that a light sends out. Requires: the radius of the scene's bounding sphere, > 0.
+[[nodiscard]] float light_power(const LightTable& table, const Light& light, float scene_radius);
+
+/// The surface it emits from; 0 for lights that have none.
+[[nodiscard]] float light_area(const Light& light);
+
+/// Fills `infinite` and `pick`. Requires: the other members are filled, every light emits something.
+void finish_light_table(LightTable& table, float scene_radius);
+
+/// P(light). Requires: light < lights.size().
+[[nodiscard]] inline float pick_probability(const LightTable& table, LightSampling sampling,
+                                            std::uint32_t light) {
+    return table.pick[std::size_t(sampling)].pmf(int(light));
+}
+
+}  // namespace pathscope

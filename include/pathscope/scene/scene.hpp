@@ -1,0 +1,108 @@
+#pragma once
+/// The scene as the renderer asks for it: what a ray meets, whether two points see each other, what shines.
+///
+/// A Scene is complete and never changes: mesh (with the quads of the scene file), analytic spheres, materials with
+/// their textures, the tree over the triangles and the table of lights. A new state of the scene is a new Scene.
+///
+/// Cut-outs (map_d below 0.5) are holes for all rays, those of shadows too. Partial opacity is not: it belongs to the
+/// BSDF. Of surfaces that coincide, the triangle with the lowest number counts, and a triangle before a sphere.
+/// Emission. Materials say how much (ke times map_ke) and from which sides; the front is the side of the geometric
+/// normal (geometry/hit.hpp). Quads emit from the front only, where the front is the side of edge_u x edge_v, and
+/// spheres outwards; both reflect nothing.
+/// Units: scene units, radiance. Thread safety: all queries are pure; a Scene is read by any number of threads.
+/// Test: tests/scene/test_scene.cpp
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "pathscope/bvh/bvh.hpp"
+#include "pathscope/bvh/traverse.hpp"
+#include "pathscope/core/result.hpp"
+#include "pathscope/geometry/hit.hpp"
+#include "pathscope/geometry/mesh.hpp"
+#include "pathscope/geometry/sphere.hpp"
+#include "pathscope/math/box.hpp"
+#include "pathscope/scene/lights.hpp"
+#include "pathscope/scene/load.hpp"
+#include "pathscope/scene/material.hpp"
+#include "pathscope/scene/scene_file.hpp"
+#include "pathscope/scene/texture.hpp"
+
+namespace pathscope {
+
+/// A sphere as it is, not tessellated. Rays test each of them, so they should be few.
+struct Sphere {
+    Vec3 centre;
+    float radius = 1;
+    std::uint32_t material = 0;
+};
+
+struct Scene {
+    Mesh mesh;
+    std::vector<Sphere> spheres;
+    std::vector<Material> materials;
+    std::vector<Texture> textures;
+    Bvh bvh;
+    LightTable lights;
+    Box bounds;                ///< Of mesh and spheres.
+    bool has_cutouts = false;  ///< Else rays need not ask.
+    /// What image/exact_sum.hpp makes its quantum of: radiance of a surface well lit, and of the brightest emitter.
+    float typical_radiance = 0, brightest_radiance = 0;
+};
+
+/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. `threads`: 0 = all
+/// cores; the result does not depend on it. Materials emit if the file lists emissive_mtl, or no light at all (a bare
+/// .obj). A scene without light is black, and said to be, but is no error. Refuses lights that are no lights: a quad
+/// without area, a negative radiance. Requires: validate(parts.mesh), materials and textures as load_scene_parts
+/// gives them.
+[[nodiscard]] Result<Scene> make_scene(const SceneFile& file, SceneParts parts, int threads = 0);
+
+inline constexpr std::uint32_t k_no_triangle = 0xffffffffu;
+
+struct SceneHit {
+    SurfacePoint point;  ///< On a sphere point.triangle is k_no_triangle, and both normals point outwards.
+    float distance = 0;  ///< t along the ray.
+    std::uint32_t light = k_no_light;  ///< In Scene::lights, if the surface is an emitter (on either side).
+};
+
+/// The first surface that the ray meets. Requires: direction of length one.
+[[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray);
+
+/// Whether anything lies in [t_min, t_max] of the ray.
+[[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);
+
+/// The same, seen by a probe (bvh/traversal_probe.hpp): for the traversal-cost buffer, and to step through a ray.
+template <class Probe>
+[[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, Probe& probe);
+
+/// What the surface sends towards `outgoing` by itself. Zero for all but emitters.
+[[nodiscard]] Rgb emitted_radiance(const Scene& scene, const SceneHit& hit, Vec3 outgoing);
+
+/// What arrives from infinity, against `direction`: sky, environment maps and the discs of suns, added up.
+[[nodiscard]] Rgb environment_radiance(const Scene& scene, Vec3 direction);
+
+/// False in the holes of the triangle's cut-out.
+[[nodiscard]] bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v);
+
+/// Half the diagonal of Scene::bounds; 1 where there is none, so that light from infinity has a disc to fall on.
+[[nodiscard]] float scene_radius(const Scene& scene);
+
+// ---------------------------------------------------------------------------------------------------------------
+
+namespace detail {
+[[nodiscard]] std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray,
+                                                   const std::optional<Hit>& hit);
+}
+
+template <class Probe>
+std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, Probe& probe) {
+    const auto solid = [&scene](std::uint32_t triangle, float u, float v) {
+        return is_solid(scene, triangle, u, v);
+    };
+    return detail::complete_hit(scene, ray,
+                                scene.has_cutouts ? closest_hit(scene.bvh, ray, solid, probe)
+                                                  : closest_hit(scene.bvh, ray, AcceptAll{}, probe));
+}
+
+}  // namespace pathscope
