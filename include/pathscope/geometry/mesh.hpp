@@ -10,6 +10,7 @@
 /// Requires: validate() passed; the scene loader calls it, all other code relies on it.
 /// Thread safety: values.   Test: tests/geometry/test_mesh.cpp
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -18,6 +19,9 @@
 #include "pathscope/math/vec.hpp"
 
 namespace pathscope {
+
+/// Leaves room in 32 bits for the nodes of a tree over them.
+inline constexpr std::size_t k_max_triangles = std::size_t{1} << 30;
 
 struct TriangleIndices {
     std::uint32_t a = 0, b = 0, c = 0;

@@ -1,0 +1,92 @@
+#include "pathscope/geometry/mesh.hpp"
+
+#include <string>
+
+#include "geometry/double_vec.hpp"
+#include "pathscope/geometry/triangle.hpp"
+
+namespace pathscope {
+namespace {
+
+/// Twice the area times the normal. Exact zero for degenerate triangles: differences of floats are exact in double
+/// (unless 2^29 apart in size), and so is the comparison of their products.
+DoubleVec area_vector(const TriangleCorners& t) {
+    const DoubleVec p = to_double(t.b) - to_double(t.a);
+    const DoubleVec q = to_double(t.c) - to_double(t.a);
+    return {difference_of_products(p.y, q.z, p.z, q.y), difference_of_products(p.z, q.x, p.x, q.z),
+            difference_of_products(p.x, q.y, p.y, q.x)};
+}
+
+Error wrong_length(const char* what, std::size_t found, std::size_t expected) {
+    return bad_input("the mesh has " + std::to_string(found) + " " + what + ", it needs none or " +
+                     std::to_string(expected));
+}
+
+Result<void> check_lengths(const Mesh& mesh) {
+    const std::size_t vertices = mesh.positions.size();
+    if (!mesh.normals.empty() && mesh.normals.size() != vertices)
+        return wrong_length("normals", mesh.normals.size(), vertices);
+    if (!mesh.uvs.empty() && mesh.uvs.size() != vertices)
+        return wrong_length("texture coordinates", mesh.uvs.size(), vertices);
+    if (!mesh.materials.empty() && mesh.materials.size() != mesh.triangles.size())
+        return wrong_length("material numbers", mesh.materials.size(), mesh.triangles.size());
+    if (mesh.triangles.size() > k_max_triangles)
+        return bad_input("the mesh has " + std::to_string(mesh.triangles.size()) + " triangles, more than " +
+                         std::to_string(k_max_triangles) + "; split the scene");
+    return {};
+}
+
+Result<void> check_vertices(const Mesh& mesh) {
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        const bool uv_finite =
+            mesh.uvs.empty() || (std::isfinite(mesh.uvs[i].x) && std::isfinite(mesh.uvs[i].y));
+        if (is_finite(mesh.positions[i]) && (mesh.normals.empty() || is_finite(mesh.normals[i])) && uv_finite)
+            continue;
+        return bad_input(
+            "vertex " + std::to_string(i) +
+            " of the mesh has a position, normal or texture coordinate that is not a finite number");
+    }
+    return {};
+}
+
+Result<void> check_indices(const Mesh& mesh) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const TriangleIndices& t = mesh.triangles[i];
+        const std::uint32_t largest = std::max(t.a, std::max(t.b, t.c));
+        if (largest >= mesh.positions.size())
+            return bad_input("triangle " + std::to_string(i) + " of the mesh uses vertex " +
+                             std::to_string(largest) + ", but there are only " +
+                             std::to_string(mesh.positions.size()));
+    }
+    return {};
+}
+
+}  // namespace
+
+bool is_degenerate(const TriangleCorners& triangle) {
+    const DoubleVec n = area_vector(triangle);
+    return n.x == 0 && n.y == 0 && n.z == 0;
+}
+
+Vec3 geometric_normal(const TriangleCorners& triangle) {
+    const DoubleVec n = area_vector(triangle);
+    const double size = length(n);
+    if (size == 0) return {};
+    return to_float(1 / size * n);
+}
+
+float area(const TriangleCorners& triangle) { return float(0.5 * length(area_vector(triangle))); }
+
+Box bounds(const Mesh& mesh) {
+    Box box;
+    for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) box.add(bounds(corners(mesh, i)));
+    return box;
+}
+
+Result<void> validate(const Mesh& mesh) {
+    if (Result<void> lengths = check_lengths(mesh); !lengths) return lengths;
+    if (Result<void> vertices = check_vertices(mesh); !vertices) return vertices;
+    return check_indices(mesh);
+}
+
+}  // namespace pathscope
