@@ -33,7 +33,8 @@ namespace {
 Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
                                          const std::vector<std::string>& arguments) {
     const auto refuse = [&](int error) {
-        return failed(fmt::format("Cannot start {}: {}.", program.string(), std::generic_category().message(error)));
+        return failed(
+            fmt::format("Cannot start {}: {}.", program.string(), std::generic_category().message(error)));
     };
     std::vector<std::string> texts{program.string()};
     texts.insert(texts.end(), arguments.begin(), arguments.end());
@@ -50,7 +51,8 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
     const int fork_error = errno;
     ::close(report[1]);
     int exec_error = 0;
-    const bool exec_failed = pid > 0 && ::read(report[0], &exec_error, sizeof exec_error) == sizeof exec_error;
+    const bool exec_failed =
+        pid > 0 && ::read(report[0], &exec_error, sizeof exec_error) == sizeof exec_error;
     ::close(report[0]);
     if (pid < 0) return refuse(fork_error);
     if (exec_failed) {

@@ -28,9 +28,10 @@ constexpr const auto& enum_table(Roulette) { return k_roulette_names; }
 
 struct RouletteParams {
     Roulette kind = Roulette::throughput;
-    int first_bounce = 3;           ///< Bounces before this one always survive.
-    float constant_survival = 0.8f; ///< q of `constant` (P_RR), in (0, 1].
-    float max_survival = 0.95f;     ///< Upper bound of q for `throughput`: below 1, so that a path in a white box ends.
+    int first_bounce = 3;            ///< Bounces before this one always survive.
+    float constant_survival = 0.8f;  ///< q of `constant` (P_RR), in (0, 1].
+    float max_survival =
+        0.95f;  ///< Upper bound of q for `throughput`: below 1, so that a path in a white box ends.
 
     friend bool operator==(const RouletteParams&, const RouletteParams&) = default;
 };

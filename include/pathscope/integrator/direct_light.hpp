@@ -1,0 +1,59 @@
+#pragma once
+/// Light straight from an emitter, found in two ways that share one integral.
+///
+///   ∫ f Le V cos dw  ≈  w_l f Le V cos / p_l   by a sampled light (sample_direct_light), and
+///                       w_b f Le cos / p_b     by the direction the path takes anyway (emission_towards)
+///
+/// with w_l + w_b = 1 for each direction (sampling/mis.hpp). With MIS off the light sample counts alone, and an emitter
+/// that the path runs into counts only after the camera or a delta lobe, which no light sample can reach.
+/// Why both: a small light is found by sampling lights, a mirror-like surface finds a large one by itself (Veach's
+/// plates).
+/// Units: radiance. The path's throughput is the caller's.
+/// See:  Veach & Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering".
+/// Thread safety: pure; `rays` is the caller's.
+/// Test: tests/integrator/test_direct_light.cpp (form factor)    Lesson: lessons/04-light-sampling
+
+#include <cstdint>
+#include <optional>
+
+#include "pathscope/integrator/vertex.hpp"
+
+namespace pathscope {
+
+/// One light sample at the vertex: f Le V cos / p_l, with its MIS weight. Requires: !vertex.specular.
+[[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
+                                             const Vertex& vertex, const BounceSample& random,
+                                             std::uint64_t& rays) {
+    const std::optional<LightSample> light = sample_light(scene, settings.light, vertex.light_reference(),
+                                                          random.light_pick(), random.light_point());
+    if (!light || !is_consistent(vertex.shaded, light->direction)) return {};
+
+    const Vec3 incoming = vertex.shaded.frame.to_local(light->direction);
+    const BsdfValue bsdf =
+        eval_bsdf_and_pdf(settings.hemisphere, vertex.shaded.bsdf, vertex.outgoing, incoming);
+    if (is_zero(bsdf.value)) return {};
+    ++rays;
+    if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
+
+    const float weight =
+        light->delta ? 1.0f : mis_weight(settings.mis, light->pdf_solid_angle, bsdf.pdf_solid_angle);
+    return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / light->pdf_solid_angle);
+}
+
+/// What the ray runs into sends back along it, with the MIS weight of having found it this way.
+[[nodiscard]] inline Rgb emission_towards(const Scene& scene, const TransportSettings& settings,
+                                          const PathOrigin& origin, const Ray& ray,
+                                          const std::optional<SceneHit>& hit) {
+    if (hit && hit->light == k_no_light) return {};
+    if (!origin.delta && !uses_both_techniques(settings.mis)) return {};
+
+    const Rgb emitted =
+        hit ? emitted_radiance(scene, *hit, -ray.direction) : environment_radiance(scene, ray.direction);
+    if (origin.delta || is_zero(emitted)) return emitted;
+    const float light_pdf =
+        hit ? sample_light_pdf(scene, settings.light, origin.reference, *hit)
+            : sample_environment_pdf(scene, settings.light, origin.reference, ray.direction);
+    return emitted * mis_weight(settings.mis, origin.pdf_solid_angle, light_pdf);
+}
+
+}  // namespace pathscope

@@ -1,0 +1,52 @@
+#pragma once
+/// The levers of light transport, each by name, and the two settings that pull them all.
+///
+///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
+///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
+///   best:     light by power, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
+///
+/// Why: both converge to the same image, so a lesson can ask what each lever buys.
+/// Thread safety: values.   Test: tests/integrator/test_settings.cpp
+
+#include <array>
+
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/integrator/russian_roulette.hpp"
+#include "pathscope/sampling/mis.hpp"
+#include "pathscope/sampling/sampler.hpp"
+#include "pathscope/scene/lights.hpp"
+#include "pathscope/shading/bsdf.hpp"
+
+namespace pathscope {
+
+enum class Setting { best, textbook };
+
+constexpr std::array k_setting_names{EnumName<Setting>{Setting::best, "best"},
+                                     EnumName<Setting>{Setting::textbook, "textbook"}};
+constexpr const auto& enum_table(Setting) { return k_setting_names; }
+
+struct TransportSettings {
+    LightSampling light = LightSampling::power;
+    HemisphereSampling hemisphere = HemisphereSampling::bsdf;
+    MisHeuristic mis = MisHeuristic::power;
+    SamplerKind sampler = SamplerKind::sobol;
+    RouletteParams roulette;
+    int max_bounces = 0;  ///< Light that scattered more often is left out; 0 = no limit.
+
+    friend bool operator==(const TransportSettings&, const TransportSettings&) = default;
+};
+
+[[nodiscard]] constexpr TransportSettings make_settings(Setting setting) {
+    TransportSettings settings;
+    if (setting == Setting::textbook) {
+        settings.light = LightSampling::area;
+        settings.hemisphere = HemisphereSampling::uniform;
+        settings.mis = MisHeuristic::off;
+        settings.sampler = SamplerKind::independent;
+        settings.roulette.kind = Roulette::constant;
+        settings.roulette.first_bounce = 0;
+    }
+    return settings;
+}
+
+}  // namespace pathscope

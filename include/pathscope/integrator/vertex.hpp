@@ -1,0 +1,91 @@
+#pragma once
+/// A path vertex, the random numbers it takes its decisions by, and the step to the next one.
+///
+///   T' = T · f(wo,wi) · |cos wi| / pdf(wi)
+///
+/// Convention: outgoing points back along the ray that arrived, incoming along the ray that goes on; both away from the
+/// surface. The vertex keeps outgoing in its local frame (z = shading normal on the viewer's side).
+/// Thread safety: values, pure functions.   Test: tests/integrator/test_path_estimator.cpp
+
+#include <cstdint>
+#include <optional>
+
+#include "pathscope/geometry/spawn.hpp"
+#include "pathscope/integrator/settings.hpp"
+#include "pathscope/sampling/sampler.hpp"
+#include "pathscope/scene/light_sampling.hpp"
+#include "pathscope/scene/scene.hpp"
+#include "pathscope/scene/surface.hpp"
+
+namespace pathscope {
+
+/// Dimension of the sampler that places a sample within its pixel.
+inline constexpr std::uint32_t k_pixel_dimension = 0;
+
+/// The random numbers of one bounce, each decision with a dimension of its own: whoever skips a decision (the direct
+/// pass plays no roulette) leaves the others as they are.
+class BounceSample {
+  public:
+    BounceSample(const PixelSampler& sampler, int bounce)
+        : sampler_(&sampler), base_(1 + k_decisions * std::uint32_t(bounce)) {}
+
+    [[nodiscard]] float light_pick() const { return sampler_->get_1d(base_); }
+    [[nodiscard]] Vec2 light_point() const { return sampler_->get_2d(base_ + 1); }
+    [[nodiscard]] float lobe() const { return sampler_->get_1d(base_ + 2); }
+    [[nodiscard]] Vec2 direction() const { return sampler_->get_2d(base_ + 3); }
+    [[nodiscard]] float roulette() const { return sampler_->get_1d(base_ + 4); }
+
+  private:
+    static constexpr std::uint32_t k_decisions = 5;
+
+    const PixelSampler* sampler_;
+    std::uint32_t base_;
+};
+
+struct Vertex {
+    SurfacePoint point;
+    ShadedPoint shaded;
+    Vec3 outgoing;          ///< Local.
+    bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
+
+    [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
+};
+
+/// Requires: outgoing of length one, in world space.
+[[nodiscard]] inline Vertex make_vertex(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
+    Vertex vertex{hit.point, shade_point(scene, hit, outgoing), {}, false};
+    vertex.outgoing = vertex.shaded.frame.to_local(outgoing);
+    vertex.specular = is_specular(vertex.shaded.bsdf);
+    return vertex;
+}
+
+/// What a ray leaves, as far as the light that it runs into must know: by which density its direction was drawn.
+struct PathOrigin {
+    LightReference reference;
+    float pdf_solid_angle = 0;
+    bool delta = true;     ///< From the camera, or by a delta lobe: no light sample competes with this ray.
+    bool diffuse = false;  ///< The vertex is not specular.
+};
+
+struct NextDirection {
+    Vec3 direction;  ///< World space, length one.
+    Rgb weight;      ///< f |cos| / pdf
+    PathOrigin origin;
+};
+
+/// Nothing if the path ends here: absorbed, or against one of the two normals.
+[[nodiscard]] inline std::optional<NextDirection> sample_next_direction(const TransportSettings& settings,
+                                                                        const Vertex& vertex,
+                                                                        const BounceSample& random) {
+    const std::optional<BsdfSample> sample = sample_direction(
+        settings.hemisphere, vertex.shaded.bsdf, vertex.outgoing, random.lobe(), random.direction());
+    if (!sample) return std::nullopt;
+    const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
+    if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
+    return NextDirection{
+        direction,
+        sample->weight,
+        {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular}};
+}
+
+}  // namespace pathscope

@@ -1,0 +1,40 @@
+#pragma once
+/// How a client session runs: where it listens, which servers it starts, how it hands out work and when it stops.
+/// None of this changes a pixel; what does is in render_state.hpp.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "pathscope/cluster/failure_detector.hpp"
+#include "pathscope/cluster/schedule.hpp"
+#include "pathscope/core/clock.hpp"
+
+namespace pathscope {
+
+inline constexpr std::array k_default_ports{5555, 5556, 5557};  ///< input, monitor, frames
+
+struct ClientConfig {
+    std::string host = "127.0.0.1";  ///< Address to bind to.
+    std::array<int, 3> ports = k_default_ports;
+    bool ports_were_chosen =
+        false;  ///< By the user: then a port in use is an error. Else free ones are taken and named.
+    bool listens = false;  ///< Sockets are opened even when no local server is asked for.
+
+    int local_servers = 0;  ///< Servers to start as child processes.
+    int local_server_threads = 1;
+    std::filesystem::path server_program;
+
+    int min_servers = 0;  ///< Indirect light waits until so many are ready.
+    ScheduleKind schedule = ScheduleKind::pull;
+    DetectorKind detector = DetectorKind::adaptive;
+    BlockOrder order = BlockOrder::spiral;
+    int block_size = 32;
+    std::uint32_t round_samples = 4;
+
+    int threads = 0;        ///< Of the client's own rendering; 0 = all cores.
+    TimeNs time_limit = 0;  ///< Stop handing out rounds then; 0 = none.
+};
+
+}  // namespace pathscope

@@ -1,0 +1,40 @@
+#include "pathscope/render/frame_sums.hpp"
+
+namespace pathscope {
+
+FrameSums::FrameSums(const BlockGrid& grid, Quantum quantum)
+    : grid_(grid),
+      quantum_(quantum),
+      sums_(std::size_t(grid.width()) * std::size_t(grid.height())),
+      samples_(grid.count(), 0) {}
+
+void FrameSums::add(const Round& round, std::span<const PixelSum> sums) {
+    CHECK(grid_.holds(round) && sums.size() == std::size_t(round.rect.area()), round.block, sums.size());
+    CHECK(samples_[round.block] + round.count <= k_max_samples_per_pixel, samples_[round.block], round.count);
+    samples_[round.block] += round.count;
+
+    std::size_t next = 0;
+    for (int y = round.rect.y; y < round.rect.y + round.rect.height; ++y) {
+        PixelSum* pixel = &sums_[std::size_t(y) * std::size_t(grid_.width()) + std::size_t(round.rect.x)];
+        for (int x = 0; x < round.rect.width; ++x) *pixel++ += sums[next++];
+    }
+}
+
+Image FrameSums::mean() const {
+    Image image(grid_.width(), grid_.height());
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const std::size_t pixel = std::size_t(y) * std::size_t(image.width) + std::size_t(x);
+            image.pixels[pixel] = pathscope::mean(sums_[pixel], samples_[grid_.block_at(x, y)], quantum_);
+        }
+    return image;
+}
+
+Plane FrameSums::samples() const {
+    Plane plane(grid_.width(), grid_.height());
+    for (int y = 0; y < plane.height; ++y)
+        for (int x = 0; x < plane.width; ++x) plane.at(x, y) = float(samples_[grid_.block_at(x, y)]);
+    return plane;
+}
+
+}  // namespace pathscope
