@@ -26,8 +26,7 @@ inline constexpr float k_exp_cutoff = 80;
     constexpr float k_ln2_high = 0.693359375f, k_ln2_low = -2.12194440e-4f;
     constexpr float k_round = 0x1.8p23f;  // Adding it leaves no bits for a fraction: n lies in the last bits.
 
-    const bool inside = d < k_exp_cutoff;  // False for NaN.
-    const float x = inside ? -d : -k_exp_cutoff;
+    const float x = -d;
     const float shifted = x * k_log2_e + k_round;
     const float n = shifted - k_round;
     const float g = (x - n * k_ln2_high) - n * k_ln2_low;
@@ -37,8 +36,10 @@ inline constexpr float k_exp_cutoff = 80;
                                   (1 + g * (1 / 4.0f) * (1 + g * (1 / 5.0f) * (1 + g * (1 / 6.0f))))));
     // Adding n to the exponent of the float multiplies by 2^n.
     const std::uint32_t power = std::bit_cast<std::uint32_t>(shifted) << 23;
-    const float result = std::bit_cast<float>(std::bit_cast<std::uint32_t>(series) + power);
-    return inside ? result : 0.0f;
+    // Outside of its range the result is masked out, not branched around: float code that a branch skips is not
+    // turned into vector code, as it might raise flags that the branch would have spared.
+    const std::uint32_t keep = d < k_exp_cutoff ? ~0u : 0u;  // NaN is not less.
+    return std::bit_cast<float>((std::bit_cast<std::uint32_t>(series) + power) & keep);
 }
 
 /// ln(z), z > 0 and finite, to within 1e-13 before it is rounded to float.

@@ -14,7 +14,7 @@
 namespace pathscope {
 namespace {
 
-bool is_background(float depth) { return depth <= 0 || depth == k_infinity; }
+bool is_background(float depth) { return depth <= 0 || std::isinf(depth); }
 
 /// exp(-t) of a distance, where sigma means what it means in the equation: t = distance^2 / (2 sigma^2). Guides are
 /// multiplied by this once, and the loops only square and add.
