@@ -19,6 +19,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -42,6 +43,9 @@ struct PackBytes {
 /// Keys in the order they were set. Lookup is linear: maps here have a few dozen keys.
 class PackMap {
   public:
+    /// Nothing if a key is there twice.
+    [[nodiscard]] static std::optional<PackMap> from_entries(std::vector<PackEntry> entries);
+
     void set(std::string_view key, PackValue value);  ///< Replaces the value of a key that is there already.
     [[nodiscard]] const PackValue* find(std::string_view key) const;  ///< Null if absent.
     [[nodiscard]] const std::vector<PackEntry>& entries() const { return entries_; }
