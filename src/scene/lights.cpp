@@ -1,58 +1,64 @@
 #include "pathscope/scene/lights.hpp"
 
+#include <algorithm>
+#include <limits>
+
 #include "pathscope/core/check.hpp"
 
 namespace pathscope {
 namespace {
 
+constexpr double k_double_pi = 3.14159265358979323846;
+
 /// Sine of an angle in degrees; in double, so that after rounding every libm gives the same float.
-float sine_of(double degrees) { return float(std::sin(degrees * (3.14159265358979323846 / 180))); }
+float sine_of(double degrees) { return float(std::sin(degrees * (k_double_pi / 180))); }
 
-/// A constant radiance from the whole sphere of directions sends 4π of it through each point of the disc.
-float power_from_all_directions(Rgb radiance, float disc_area) {
-    return luminance(radiance) * 4 * k_pi * disc_area;
+/// Each radiance sends π per area; from the whole sphere of directions, 4π through each point of the disc.
+double power_of(const LightTable&, const TriangleLight& light, double) {
+    return luminance(light.mean_radiance) * k_double_pi * light.area * (light.two_sided ? 2 : 1);
 }
-
-float power_of(const LightTable&, const TriangleLight& light, float) {
-    return luminance(light.mean_radiance) * k_pi * light.area * (light.two_sided ? 2 : 1);
+double power_of(const LightTable&, const SphereLight& light, double) {
+    return luminance(light.radiance) * k_double_pi * light_area(light);
 }
-float power_of(const LightTable&, const SphereLight& light, float) {
-    return luminance(light.radiance) * k_pi * light_area(light);
+double power_of(const LightTable&, const PointLight& light, double) {
+    return luminance(light.intensity) * 4 * k_double_pi;
 }
-float power_of(const LightTable&, const PointLight& light, float) {
-    return luminance(light.intensity) * 4 * k_pi;
-}
-float power_of(const LightTable&, const SunLight& light, float disc_area) {
+double power_of(const LightTable&, const SunLight& light, double disc_area) {
     return luminance(light.irradiance) * disc_area;
 }
-float power_of(const LightTable&, const SkyLight& light, float disc_area) {
-    return power_from_all_directions(light.radiance, disc_area);
+double power_of(const LightTable&, const SkyLight& light, double disc_area) {
+    return luminance(light.radiance) * 4 * k_double_pi * disc_area;
 }
-float power_of(const LightTable& table, const EnvironmentLight& light, float disc_area) {
-    return power_from_all_directions(table.environments[light.map].mean_radiance, disc_area);
+double power_of(const LightTable& table, const EnvironmentLight& light, double disc_area) {
+    return luminance(table.environments[light.map].mean_radiance) * 4 * k_double_pi * disc_area;
 }
 
-std::vector<float> weights_by_power(const LightTable& table, float scene_radius) {
-    std::vector<float> weights;
+std::vector<double> weights_by_power(const LightTable& table, float scene_radius) {
+    std::vector<double> weights;
     for (const Light& light : table.lights) weights.push_back(light_power(table, light, scene_radius));
     return weights;
 }
 
 /// In units of one share, which is 1 for each light without area and 1 for all surface together.
-std::vector<float> weights_by_area(const LightTable& table) {
+std::vector<double> weights_by_area(const LightTable& table) {
     double total = 0;
     for (const Light& light : table.lights) total += light_area(light);
-    std::vector<float> weights;
+    std::vector<double> weights;
     for (const Light& light : table.lights) {
         const double area = light_area(light);
-        weights.push_back(area > 0 ? float(area / total) : 1.0f);
+        weights.push_back(area > 0 ? area / total : 1);
     }
     return weights;
 }
 
-Distribution1d make_pick(const std::vector<float>& weights) {
-    auto pick = Distribution1d::make(weights);
-    CHECK(pick, weights.size());
+/// Relative to the largest, so that they fit into floats; none becomes zero.
+Distribution1d make_pick(const std::vector<double>& weights) {
+    const double largest = *std::max_element(weights.begin(), weights.end());
+    std::vector<float> relative;
+    for (const double weight : weights)
+        relative.push_back(std::max(float(weight / largest), std::numeric_limits<float>::min()));
+    auto pick = Distribution1d::make(relative);
+    CHECK(pick, weights.size(), largest);
     return *std::move(pick);
 }
 
@@ -79,17 +85,16 @@ bool sun_covers(const SunLight& sun, Vec3 direction) {
     return length_squared(direction - sun.to_sun) < 2 * sun.one_minus_cos;
 }
 
-float light_power(const LightTable& table, const Light& light, float scene_radius) {
+double light_power(const LightTable& table, const Light& light, float scene_radius) {
     CHECK(scene_radius > 0, scene_radius);
-    const float disc_area = k_pi * scene_radius * scene_radius;
+    const double disc_area = k_double_pi * scene_radius * scene_radius;
     return std::visit([&](const auto& kind) { return power_of(table, kind, disc_area); }, light);
 }
 
-float light_area(const Light& light) {
+double light_area(const Light& light) {
     if (const auto* triangle = std::get_if<TriangleLight>(&light)) return triangle->area;
-    if (const auto* sphere = std::get_if<SphereLight>(&light))
-        return 4 * k_pi * sphere->radius * sphere->radius;
-    return 0;
+    const auto* sphere = std::get_if<SphereLight>(&light);
+    return sphere ? 4 * k_double_pi * sphere->radius * sphere->radius : 0;
 }
 
 void finish_light_table(LightTable& table, float scene_radius) {

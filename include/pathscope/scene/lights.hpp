@@ -109,10 +109,10 @@ struct LightTable {
 };
 
 /// Luminance of the power that a light sends out. Requires: the radius of the scene's bounding sphere, > 0.
-[[nodiscard]] float light_power(const LightTable& table, const Light& light, float scene_radius);
+[[nodiscard]] double light_power(const LightTable& table, const Light& light, float scene_radius);
 
 /// The surface it emits from; 0 for lights that have none.
-[[nodiscard]] float light_area(const Light& light);
+[[nodiscard]] double light_area(const Light& light);
 
 /// Fills `infinite` and `pick`. Requires: the other members are filled, every light emits something.
 void finish_light_table(LightTable& table, float scene_radius);

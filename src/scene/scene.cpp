@@ -1,0 +1,104 @@
+#include "pathscope/scene/scene.hpp"
+
+#include "lookup.hpp"
+
+namespace pathscope {
+namespace {
+
+/// The nearest sphere before the ray's end.
+struct NearestSphere {
+    SphereHit hit;
+    std::uint32_t index = 0;
+};
+std::optional<NearestSphere> nearest_sphere(const Scene& scene, Ray ray) {
+    std::optional<NearestSphere> nearest;
+    for (std::uint32_t i = 0; i < scene.spheres.size(); ++i) {
+        const auto hit = intersect_sphere(ray, scene.spheres[i].centre, scene.spheres[i].radius);
+        if (!hit || (nearest && hit->t == ray.t_max)) continue;
+        ray.t_max = hit->t;
+        nearest = NearestSphere{*hit, i};
+    }
+    return nearest;
+}
+
+SceneHit hit_on_sphere(const Scene& scene, const NearestSphere& nearest) {
+    SceneHit hit;
+    hit.point.position = nearest.hit.position;
+    hit.point.position_error = nearest.hit.position_error;
+    hit.point.geometric_normal = hit.point.shading_normal = nearest.hit.normal;
+    hit.point.triangle = k_no_triangle;
+    hit.point.material = scene.spheres[nearest.index].material;
+    hit.distance = nearest.hit.t;
+    hit.light = scene.lights.of_sphere[nearest.index];
+    return hit;
+}
+
+SceneHit hit_on_mesh(const Scene& scene, const Hit& found) {
+    SceneHit hit;
+    hit.point = surface_point(scene.mesh, found);
+    hit.distance = found.t;
+    // The material is asked first: it is needed anyway, while the table is one more line from memory.
+    if (scene.materials[hit.point.material].emits()) hit.light = scene.lights.of_triangle[found.triangle];
+    return hit;
+}
+
+}  // namespace
+
+namespace detail {
+
+std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& hit) {
+    if (!scene.spheres.empty()) {
+        Ray rest = ray;
+        if (hit) rest.t_max = hit->t;
+        const auto sphere = nearest_sphere(scene, rest);
+        if (sphere && !(hit && sphere->hit.t == hit->t)) return hit_on_sphere(scene, *sphere);
+    }
+    if (!hit) return std::nullopt;
+    return hit_on_mesh(scene, *hit);
+}
+
+}  // namespace detail
+
+bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v) {
+    const Material& material = scene.materials[scene.mesh.material_of(triangle)];
+    return !material.map_d || is_solid_at(scene, material, interpolate_uv(scene.mesh, triangle, u, v));
+}
+
+std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
+    NullTraversalProbe probe;
+    return intersect(scene, ray, probe);
+}
+
+bool occluded(const Scene& scene, const Ray& ray) {
+    const auto solid = [&scene](std::uint32_t triangle, float u, float v) {
+        return is_solid(scene, triangle, u, v);
+    };
+    if (scene.has_cutouts ? any_hit(scene.bvh, ray, solid) : any_hit(scene.bvh, ray)) return true;
+    for (const Sphere& sphere : scene.spheres)
+        if (intersect_sphere(ray, sphere.centre, sphere.radius)) return true;
+    return false;
+}
+
+Rgb emitted_radiance(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
+    return emission_at(scene, hit.point, outgoing);
+}
+
+Rgb environment_radiance(const Scene& scene, Vec3 direction) {
+    Rgb sum;
+    for (const std::uint32_t index : scene.lights.infinite) {
+        const Light& light = scene.lights.lights[index];
+        if (const auto* sky = std::get_if<SkyLight>(&light)) sum += sky->radiance;
+        if (const auto* map = std::get_if<EnvironmentLight>(&light))
+            sum += environment_map_radiance(scene.lights.environments[map->map], direction);
+        if (const auto* sun = std::get_if<SunLight>(&light))
+            if (sun_covers(*sun, direction)) sum += sun->radiance;
+    }
+    return sum;
+}
+
+float scene_radius(const Scene& scene) {
+    const float radius = length(scene.bounds.extent()) / 2;
+    return radius > 0 ? radius : 1;
+}
+
+}  // namespace pathscope
