@@ -5,9 +5,9 @@
 ///                 \                            /            rtt    = (t3 - t0) - (t2 - t1)
 ///     server        t1 --- (thinks) --- t2                  |true offset - offset| <= rtt / 2
 ///
-/// The midpoint is right if both ways take equally long, and wrong by at most half the round trip: the error band.
-/// Queues only ever lengthen round trips, so the shortest one in the window says most; it ages by what two quartz
-/// clocks may drift apart (100 ppm).
+/// The midpoint is right if both ways take equally long, and wrong by at most half the round trip: the error
+/// band. Queues only ever lengthen round trips, so the shortest one in the window says most; it ages by what
+/// two quartz clocks may drift apart (100 ppm).
 /// Units: nanoseconds; server time = client time + offset. Thread safety: one thread at a time.
 /// See: Mills 1991, "Internet time synchronization: the network time protocol" (clock filter).
 /// Test: tests/cluster/test_clock_offset.cpp

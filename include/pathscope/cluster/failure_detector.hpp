@@ -9,11 +9,11 @@
 ///
 ///             phi = 1: one such gap in 10 is longer than this silence; phi = 8: one in 100,000,000.
 ///             Suspect at phi >= 4 (a second server may be given the same round: harmless), dead at phi >= 8.
-///             With beats every 250 ms and little jitter, suspect after 0.64 s and dead after 0.73 s of silence;
-///             with jitter, the window widens sigma and the limits move out by themselves.
+///             With beats every 250 ms and little jitter: suspect after 0.64 s of silence, dead after
+///             0.73 s. With jitter, the window widens sigma, and the limits move out by themselves.
 ///
-/// Why `pause`: a server on a busy machine stops for a moment now and then, without jitter before it. Why a floor
-/// for sigma: after 64 perfect beats the estimate would be near 0 and the first late one a death.
+/// Why `pause`: a server on a busy machine stops for a moment now and then, without jitter before it. Why a
+/// floor for sigma: after 64 perfect beats the estimate would be near 0, and the first late one a death.
 /// No clock: `now` is an argument and never falls. Thread safety: one thread at a time.
 /// See: Hayashibara et al. 2004, "The phi accrual failure detector".
 /// Test: tests/cluster/test_failure_detector.cpp
@@ -90,9 +90,12 @@ class AdaptiveDetector {
     [[nodiscard]] double phi(TimeNs silence) const;
 
   private:
+    void add_gap(TimeNs gap);
+
     AdaptiveDetectorParams params_;
     std::array<TimeNs, k_window> gaps_{};
     std::size_t gaps_seen_ = 0;
+    double mean_ = 0, sigma_ = 0;  ///< Of the gaps in the window, in nanoseconds.
     TimeNs last_beat_;
     TimeNs last_sign_;
 };
@@ -110,8 +113,8 @@ class FailureDetector {
     /// Anything else arrived: the server lives, but results say nothing about the rhythm of beats.
     void on_traffic(TimeNs now);
 
-    /// This process itself did not run for a while (stopped, suspended, overloaded): that silence is its own, and
-    /// proves nothing about servers.
+    /// This process itself did not run for a while (stopped, suspended, overloaded): that silence is its own,
+    /// and proves nothing about servers.
     void excuse(TimeNs pause);
 
     [[nodiscard]] Suspicion assess(TimeNs now) const;

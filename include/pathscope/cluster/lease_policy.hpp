@@ -1,12 +1,12 @@
 #pragma once
 /// How long a lease lasts, from how fast its server was so far.
 ///
-///     duration = clamp(4 * predicted, 0.5 s, max(6 s, 2 * predicted)) * 2^attempts
+///     duration = clamp(4 * predicted, 0.5 s, max(6 s, 2 * predicted)) * 2^min(attempts, 6), at most an hour
 ///
-/// Why 4: rounds of one image differ in cost, and a lease that ends too early only makes work twice. Why at least
-/// half a second: a server may be stopped for a moment by its machine. Why an upper end: a stuck server holds a
-/// round no longer than the classic system took to see a death. Why doubling: when every server is slower than
-/// predicted, each lease would end early for ever; the attempts before this one say so.
+/// Why 4: rounds of one image differ in cost, and a lease that ends too early only makes work twice. Why at
+/// least half a second: a machine may stop a process for a moment. Why an upper end: a stuck server holds a
+/// round no longer than the classic system took to see a death. Why doubling: when every server is slower
+/// than predicted, each lease would end early for ever; the attempts before this one say so.
 /// Thread safety: values.   Test: tests/cluster/test_lease_policy.cpp
 
 #include <cstdint>
@@ -16,26 +16,27 @@
 
 namespace pathscope {
 
-/// A server's speed: work per second, as an exponentially weighted mean over its results.
+/// A server's speed, as an exponentially weighted mean over its results. The mean is taken of time per work,
+/// not of work per time, because it is times that are predicted.
 class SpeedEstimate {
   public:
-    /// Work in any unit that is the same for all servers (samples times pixels); seconds it took the server.
-    /// Results without work or time are ignored.
+    /// Work in any unit that is the same for all servers (samples times pixels), and how long it took the
+    /// server. A result without work or time is ignored.
     void add(double work, TimeNs duration);
 
-    [[nodiscard]] bool measured() const { return per_second_ > 0; }
-    [[nodiscard]] double per_second() const { return per_second_; }  ///< 0 until measured.
+    [[nodiscard]] bool measured() const { return seconds_per_work_ > 0; }
+    [[nodiscard]] double per_second() const { return measured() ? 1 / seconds_per_work_ : 0; }
 
     /// How long that much work will take; nothing until measured.
     [[nodiscard]] std::optional<TimeNs> predict(double work) const;
 
   private:
     static constexpr double k_weight_of_newest = 0.25;
-    double per_second_ = 0;
+    double seconds_per_work_ = 0;
 };
 
-/// attempts: how often the round was granted before (Ledger::attempts). predicted: nothing = not known, then the
-/// upper end. With credits, a server works its leases off one after the other: pass the sum of what it owes.
+/// predicted: nothing = not known, then the usual upper end. A server works its leases off one after the
+/// other: pass the sum of what it owes. attempts: how often the round was granted before (Ledger::attempts).
 [[nodiscard]] TimeNs lease_duration(std::optional<TimeNs> predicted, std::uint32_t attempts);
 
 }  // namespace pathscope

@@ -1,10 +1,10 @@
 #pragma once
 /// The ledger: the client's exactly-once account of rounds.
 ///
-/// The work of an epoch is a number of units (with strategy `blocks` a unit is a block of pixels; the ledger does
-/// not know). Each unit needs the samples [0, samples) once, cut into rounds of round_samples; the last may
-/// be shorter. A round is *granted* to a server as a lease with a deadline, and *committed* by the first result
-/// that fits, or granted again when the lease ends without one:
+/// The work of an epoch is a number of units (with strategy `blocks` a unit is a block of pixels; the ledger
+/// does not know). Each unit needs the samples [0, samples) once, cut into rounds of round_samples; the last
+/// may be shorter. A round is *granted* to a server as a lease with a deadline, and *committed* by the first
+/// result that fits, or granted again when the lease ends without one:
 ///
 ///                 grant                       commit
 ///        fresh  --------->  held by 1..2  -------------->  committed
@@ -24,8 +24,8 @@
 /// How a duplicate is known without a record of it: a unit's rounds are first granted in rising order, so
 /// `index < fresh` means "was granted", and without a record, "is committed".
 ///
-/// No socket, no clock (`now` is an argument and never falls). What is decided is written to the event store with
-/// its reason, if there is one. Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
+/// No socket, no clock (`now` is an argument and never falls). What is decided is written to the event store
+/// with its reason, if there is one. Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
 /// Thread safety: one thread at a time.
 /// Test: tests/cluster/test_ledger.cpp, test_simulation.cpp
 
@@ -97,6 +97,8 @@ struct ResultClaim {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
     ServerId server;  ///< From the connection it came by, not from the message.
+
+    bool operator==(const ResultClaim&) const = default;
 };
 
 enum class Verdict {
@@ -131,7 +133,8 @@ struct LedgerCounts {
     std::uint64_t expired = 0;
     std::uint64_t revoked = 0;
     std::uint64_t dropped = 0;  ///< Its epoch ended.
-    // Results: each received one is counted once.
+    // Results: each received one has met exactly one of these verdicts.
+    std::uint64_t received = 0;
     std::uint64_t accepted = 0;
     std::uint64_t duplicates = 0;
     std::uint64_t stale = 0;
@@ -151,9 +154,8 @@ struct UnitSnapshot {
 
 class Ledger {
   public:
-    static constexpr std::size_t k_leases_per_round =
-        8;  ///< Remembered; beyond, the newest ended one is forgotten.
-    static constexpr std::size_t k_copies_per_round = 2;  ///< Held at once.
+    static constexpr std::size_t k_leases_per_round = 8;   ///< Remembered, ended ones included.
+    static constexpr std::size_t k_holders_per_round = 2;  ///< Outstanding at once.
 
     /// The store is where decisions and counters go; it may be null, and must outlive the ledger.
     explicit Ledger(EventStore* store = nullptr) : store_(store) {}
@@ -174,8 +176,8 @@ class Ledger {
     /// Requires: duration > 0.
     std::optional<Lease> grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
 
-    /// Grants a round that another server holds, so that the quicker one counts. Returns nothing unless exactly
-    /// one other server holds it.
+    /// Grants a round that another server holds, so that the quicker one counts. Returns nothing unless
+    /// exactly one other server holds it.
     std::optional<Lease> grant_copy(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
 
     /// What commit() would answer: lets a session refuse before it decodes, and decode before it commits.
@@ -190,8 +192,8 @@ class Ledger {
     /// Ends the leases of a server that died or left, and reopens their rounds.
     std::vector<Lease> revoke(ServerId server, TimeNs now);
 
-    /// Ends one lease that its server gave back, or whose result could not be used. Returns nothing if the server
-    /// does not hold it.
+    /// Ends one lease that its server gave back, or whose result could not be used. Returns nothing if the
+    /// server does not hold it.
     std::optional<Lease> release(LeaseId lease, ServerId server, TimeNs now);
 
     // -- View (schedules, panels, statistics) ---------------------------------------------------------------
@@ -214,6 +216,8 @@ class Ledger {
     [[nodiscard]] std::vector<Lease> outstanding_leases() const;
     [[nodiscard]] std::size_t outstanding() const { return outstanding_; }
     [[nodiscard]] std::size_t outstanding(ServerId server) const;
+    /// The oldest outstanding lease of other servers whose round nobody else holds.
+    [[nodiscard]] std::optional<Lease> oldest_uncopied(ServerId not_of) const;
     [[nodiscard]] std::optional<Lease> find(LeaseId lease) const;  ///< Outstanding ones only.
 
     /// The next moment at which expire() has something to do.
@@ -239,6 +243,7 @@ class Ledger {
     struct Record {
         Lease lease;
         bool outstanding = true;
+        bool revoked = false;
     };
     /// A round that was granted and is not committed.
     struct Active {
@@ -252,11 +257,16 @@ class Ledger {
     [[nodiscard]] RoundKey key_of(const Lease& lease) const {
         return {lease.unit, lease.first / plan_.round_samples};
     }
-    Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration, bool copy);
-    void end_lease(Record& record);
-    void end_and_reopen(Record& record, UnitReason reason, TimeNs now);
-    void forget_oldest_ended(Active& active);
-    void count_verdict(Verdict verdict, const ResultClaim& claim, TimeNs now);
+    Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration,
+               UnitReason reason);
+    void forget_one_ended(Active& active);
+    void refuse(Verdict verdict, const ResultClaim& claim, TimeNs now);
+    void end(Record& record);
+    void end_without_result(Record& record, UnitReason reason, TimeNs now);
+    void close_again(RoundKey round);
+    [[nodiscard]] Result<void> audit_balances() const;
+    [[nodiscard]] Result<void> audit_records() const;
+    [[nodiscard]] Result<void> audit_units() const;
     void note(const Lease& lease, UnitChange change, UnitReason reason, TimeNs now,
               ServerId previous = {}) const;
     void count(Counter counter, std::uint64_t n, ServerId server) const;

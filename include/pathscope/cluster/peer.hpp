@@ -7,9 +7,9 @@
 ///     from any of these: --lost--> DEAD --removed--> GONE
 ///
 /// Busy or idle is not a state: a READY server is busy while the ledger says it holds a lease. One truth.
-/// SUSPECT keeps its leases (a copy of its rounds may go to others); DEAD loses them, its id is never used again,
-/// and if it speaks it has to say HELLO anew. What the table does not list is refused and counted.
-/// No clock, no socket. Thread safety: one thread at a time.   Test: tests/cluster/test_peer.cpp
+/// SUSPECT keeps its leases (a copy of its rounds may go to others); DEAD loses them, its id is never used
+/// again, and if it speaks it has to say HELLO anew. What the table does not list is refused and counted. No
+/// clock, no socket. Thread safety: one thread at a time.   Test: tests/cluster/test_peer.cpp
 
 #include <array>
 #include <cstdint>
@@ -17,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pathscope/cluster/failure_detector.hpp"
 #include "pathscope/core/clock.hpp"
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/core/ids.hpp"
@@ -68,6 +69,10 @@ class Peer {
     /// Takes the step if the table has it; returns the row, or null and counts a refusal.
     const PeerTransition* apply(PeerCause cause, TimeNs now);
 
+    /// Takes the step that a detector's opinion asks for, if any: lost, silent or heard. Only a READY server
+    /// becomes SUSPECT, for suspicion is about leases, and the others hold none that could be copied.
+    const PeerTransition* apply(Liveness liveness, TimeNs now);
+
     [[nodiscard]] ServerId id() const { return id_; }
     [[nodiscard]] PeerState state() const { return state_; }
     [[nodiscard]] TimeNs since() const { return since_; }
@@ -87,9 +92,9 @@ class Peer {
 
 /// Credits: how many leases a server may owe an answer for. Bounds what piles up at it, and in between.
 ///
-/// A lease's credit comes back when its result is merged or refused, or when the server gives the lease back; not
-/// when the lease expires, for then the server is still busy with it. A server that never answers gets it back when
-/// the debt is written off, so that a lost message does not starve it for ever.
+/// A lease's credit comes back when its result is merged or refused, or when the server gives the lease back;
+/// not when the lease expires, for then the server is still busy with it. A server that never answers gets it
+/// back when the debt is written off, so that a lost message does not starve it for ever.
 class Credits {
   public:
     explicit Credits(std::size_t limit = 2) : limit_(limit) {}

@@ -1,17 +1,18 @@
 #pragma once
 /// Schedules: which open round a server gets next.
 ///
-///   static    unit i belongs to server i mod N; when a server dies its units are dealt out to the others (the
-///             classic system's fixed strips, made finer)
+///   static    unit i belongs to server i mod N; when a server dies its units are dealt out to the others
+///             (the classic system's fixed strips, made finer)
 ///   weighted  units are dealt in proportion to measured speed
-///   pull      any open round to whoever asks; the default: fast servers ask more often, so it balances itself
+///   pull      any open round to whoever asks; the default: fast servers ask more often, so that it
+///             balances itself
 ///
-/// All give out reopened rounds first (someone waited for them long enough), then fresh ones pass by pass in unit
-/// order: every unit gets its first round before any gets its second, so that the picture grows evenly.
+/// All give out reopened rounds first (someone waited for them long enough), then fresh ones pass by pass in
+/// unit order: every unit gets its first round before any gets its second, so that the picture grows evenly.
 ///
-/// A schedule only proposes; the ledger grants, and refuses what is not open. So no schedule can lose or double a
-/// round. No clock, no socket. Cost: pick is O(1) amortised over a plan, plus a search of the reopened rounds
-/// (never more than leases were outstanding) for `static` and `weighted`.
+/// A schedule only proposes; the ledger grants, and refuses what is not open. So no schedule can lose or
+/// double a round. No clock, no socket. Cost: pick is O(1) amortised over a plan, plus a search of the
+/// reopened rounds (never more than leases were outstanding) for `static` and `weighted`.
 /// Thread safety: one thread at a time.   Test: tests/cluster/test_schedule.cpp
 
 #include <cstdint>
@@ -62,9 +63,9 @@ class Schedule {
 
     [[nodiscard]] ScheduleKind kind() const { return kind_; }
 
-    /// Tells who may be given work; call it when someone joins, leaves or got faster. `static` deals anew when
-    /// someone joins, and moves only the units of those who left; `weighted` deals anew when someone joins or
-    /// leaves, or a speed moved by more than a quarter; `pull` needs no dealing.
+    /// Tells who may be given work; call it when someone joins, leaves or got faster. `static` deals anew
+    /// when someone joins, and moves only the units of those who left; `weighted` deals anew when someone
+    /// joins or leaves, or a speed moved by more than a quarter; `pull` needs no dealing.
     void set_servers(std::vector<ServerShare> alive);
 
     /// A round that ledger.grant(server, round, ...) will grant, or nothing if there is none for this server.
@@ -81,27 +82,29 @@ class Schedule {
         std::size_t position = 0;
         std::uint32_t pass = 0;
         bool begun = false;
+        bool done = false;
     };
 
     [[nodiscard]] static std::optional<RoundKey> next_of(Walk& walk, const Ledger& ledger);
     [[nodiscard]] bool owns(ServerId server, std::uint32_t unit) const;
-    void deal();
     void deal_static();
     void deal_weighted();
     void make_walks();
+
+    static constexpr ServerId k_everyone{~0u};  ///< Whose walk it is with `pull`.
 
     ScheduleKind kind_;
     std::vector<std::uint32_t> unit_order_;
     std::vector<ServerShare> alive_;  ///< By rising id.
     std::vector<ServerShare> dealt_;  ///< To whom the units were dealt last.
     std::vector<ServerId> owner_of_unit_;
-    std::map<ServerId, Walk> walks_;  ///< `pull` keeps one for all, under the id 0.
+    std::map<ServerId, Walk> walks_;  ///< By owner.
     Epoch epoch_;
 };
 
-/// The straggler's round that a server with nothing else to do had better compute too: the oldest lease that only
-/// one other server holds, if it has run longer than k_straggler_factor times what this server would need.
-/// Spark speculates at 1.5 times the median; the same factor here.
+/// The straggler's round that a server with nothing else to do had better compute too: the oldest lease that
+/// only one other server holds, if it has run longer than k_straggler_factor times what this server would
+/// need. Spark speculates at 1.5 times the median; the same factor here.
 inline constexpr double k_straggler_factor = 1.5;
 [[nodiscard]] std::optional<RoundKey> pick_straggler(const Ledger& ledger, ServerId server, TimeNs now,
                                                      TimeNs own_estimate);

@@ -3,8 +3,8 @@
 /// traces and recordings are made of.
 ///
 /// An event is of fixed size and owns no memory (texts are bounded), so that a ring of them is a known number
-/// of bytes. Its time is on the client's time line; a server's times are placed there before they are recorded
-/// (cluster/clock_offset.hpp). Thread safety: values.   Test: tests/probe/test_event_store.cpp
+/// of bytes. Its time is on the client's time line; a server's times are placed there before they are
+/// recorded (cluster/clock_offset.hpp). Thread safety: values.   Test: tests/probe/test_event_store.cpp
 
 #include <cstdint>
 #include <variant>

@@ -7,7 +7,8 @@
 /// Why not keep samples: a run has no limit in time, and a reservoir's p95 wobbles from run to run.
 /// Units: nanoseconds. Below 1 us and above 68 s everything falls into the outermost bucket; quantiles never
 /// leave [smallest, largest]. Thread safety: one thread at a time.
-/// See: G. Tene, HdrHistogram (the idea of log-linear buckets).   Test: tests/probe/test_latency_histogram.cpp
+/// See: G. Tene, HdrHistogram (the idea of log-linear buckets).   Test:
+/// tests/probe/test_latency_histogram.cpp
 
 #include <array>
 #include <cstdint>
