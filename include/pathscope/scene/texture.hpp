@@ -3,13 +3,15 @@
 ///
 ///   uv -> texel space (u * width - 1/2, (1 - v) * height - 1/2); the four texels around it are weighted
 ///
-/// Convention: as in OBJ, u runs to the right and v upwards, (0, 0) is the lower left corner of the image;
-/// the rows of image files start at the top. Texel centres lie at half-integers. A colour texture holds
-/// values of sRGB, decoded to linear light by a table before they are weighted; a grey one holds plain
-/// numbers n / 255. There are no mipmaps: a pixel's samples average the texels it sees. Why tiles: texels lie
-/// in 4x4 tiles, of 64 bytes (a cache line) for colours, because scattered look-ups of 2x2 texels then
-/// touch 1.6 lines on average in place of 2.1. Requires: finite uv. Thread safety: reading from any thread.
-/// Test: tests/scene/test_texture.cpp
+/// Convention: as in OBJ, u runs to the right and v upwards, (0, 0) is the lower left corner of the image; the
+/// rows of image files start at the top. Texel centres lie at half-integers. A colour texture holds values of
+/// sRGB, decoded to linear light by a table before they are weighted; a grey one holds plain numbers n / 255.
+/// There are no mipmaps: a pixel's samples average the texels it sees. A uv that is not finite counts as 0.
+///
+/// Why tiles: texels lie in 4x4 tiles, of 64 bytes (a cache line) for colours, because scattered look-ups of
+/// 2x2 texels then touch 1.6 lines on average in place of 2.1.
+///
+/// Thread safety: reading from any thread.   Test: tests/scene/test_texture.cpp
 
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +27,7 @@ namespace pathscope {
 
 enum class TextureUsage {
     colour,  ///< sRGB; 4 bytes per texel (3 used).
-    grey,    ///< Linear; 1 byte per texel: the alpha channel where the image has one, else its luminance.
+    grey,    ///< Linear; 1 byte per texel: the alpha channel if it is not all opaque, else the luminance.
 };
 
 class Texture {
@@ -46,7 +48,7 @@ class Texture {
   private:
     TextureUsage usage_;
     int width_, height_;
-    int tiles_x_;
+    std::size_t tiles_per_row_;
     std::vector<std::uint8_t> texels_;
 };
 
