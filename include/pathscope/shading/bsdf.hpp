@@ -108,6 +108,8 @@ struct BsdfSample {
     bool specular = false;      ///< A delta lobe.
     bool straight = false;      ///< The ray went on as if nothing were there, up to the weight: incoming ==
                                 ///< -outgoing. Implies specular.
+    float compression = 1;      ///< The part of the weight that is radiance squeezed by refraction, 1/eta^2.
+                                ///< It comes back when the path leaves the body: roulette divides it out.
 };
 
 /// Draws `incoming`; nothing if the path ends here (absorbed, or no light can come from there).

@@ -1,0 +1,57 @@
+#pragma once
+/// The Frostbite standard material: a rough specular coat over a diffuse base.
+///
+///   f = f_specular + f_diffuse
+///   f_specular = D(h) V(wo, wi) F(cos_d),    F by Schlick, f90 = saturate(50 * dot(f0, 0.33))
+///   f_diffuse  = rho(wo, wi) * S(wo, wi),    S: Disney diffuse with renormalised energy (diffuse.hpp)
+///
+/// D and V as in microfacet.hpp with alpha = roughness^2 (GGX, height-correlated Smith); h the half vector,
+/// cos_d = wo . h. f90 below 1 lets a specular colour of zero mean no specular at all.
+///
+/// Where this differs from the paper, and why. There rho is the base colour. Coat and base then reflect
+/// together up to 1.1 of what arrives (white base, f0 = 0.04, grazing angles), and far more for files whose
+/// diffuse and specular colours sum to more than 1. Here the base gets at most what the coat leaves,
+///
+///   rho = min(diffuse, L(wo), L(wi)),   L(w) = (1 - margin - E_s(w)) / E_d(w),   per colour channel,
+///
+/// with the albedos E_s and E_d from Frostbite's own pre-integrated table (albedo_table.hpp). The minimum of
+/// both directions keeps Helmholtz reciprocity, and
+///
+///   E(wo) <= E_s(wo) + L(wo) E_d(wo) <= 1   for every direction, roughness, diffuse and f0.
+///
+/// Where diffuse is below both limits (nearly always when diffuse <= 0.9 and f0 = 0.04), f is Frostbite's to
+/// the last bit. Energy lost to light that would bounce between facets is not put back, as in the paper;
+/// tests/shading/test_energy.cpp states how much that is. Roughness below 0.032 is taken as 0.032
+/// (k_min_alpha).
+///
+/// See:  Lagarde & de Rousiers 2014, "Moving Frostbite to Physically Based Rendering", 3.1 and listings 2-3.
+/// Test: tests/shading/test_energy.cpp, test_bsdf.cpp, test_sampling.cpp
+
+#include <algorithm>
+
+#include "pathscope/math/vec.hpp"
+#include "pathscope/shading/bsdf.hpp"
+#include "pathscope/shading/microfacet.hpp"
+
+namespace pathscope {
+
+[[nodiscard]] constexpr float alpha_from_roughness(float roughness) {
+    return std::max(roughness * roughness, k_min_alpha);
+}
+
+[[nodiscard]] constexpr float f90_from_f0(Rgb f0) {
+    return std::clamp(50 * 0.33f * (f0.x + f0.y + f0.z), 0.0f, 1.0f);
+}
+
+/// Value without the cosine, and density of sample_standard. Zero unless both directions have z > 0.
+[[nodiscard]] BsdfValue eval_standard(const StandardSurface& surface, Vec3 outgoing, Vec3 incoming);
+
+/// Draws a reflection about a visible facet or a cosine-distributed direction, each as often as its lobe's
+/// share of the light reflected towards `outgoing`. May return z <= 0, where nothing is reflected.
+/// Requires: outgoing.z > 0; u_lobe and u in [0, 1).
+[[nodiscard]] Vec3 sample_standard(const StandardSurface& surface, Vec3 outgoing, float u_lobe, Vec2 u);
+
+/// Directional albedo from the table; see guide_albedo().
+[[nodiscard]] Rgb standard_albedo(const StandardSurface& surface, Vec3 outgoing);
+
+}  // namespace pathscope
