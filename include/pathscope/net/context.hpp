@@ -3,7 +3,7 @@
 ///
 /// One per process is the rule. Sockets keep their context alive, so that the order in which a context and its
 /// sockets go out of scope does not matter: the last one to go waits for what linger allows to be sent.
-/// Thread safety: yes.   Test: tests/net/test_sockets.cpp
+/// Thread safety: yes.   Test: tests/net/test_router_dealer.cpp
 
 #include <memory>
 

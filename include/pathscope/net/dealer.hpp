@@ -36,6 +36,9 @@ class DealerSocket {
 
     [[nodiscard]] Pollable pollable() const { return {socket_.get()}; }
 
+    /// Ready when send() would deliver: as soon as the connection stands. Only for while one waits to send.
+    [[nodiscard]] Pollable sendable() const { return {socket_.get(), -1, true}; }
+
   private:
     SocketHandle socket_;
 };

@@ -21,7 +21,7 @@
 namespace pathscope {
 
 inline constexpr std::size_t k_max_pollables = 16;
-using Readable = std::bitset<k_max_pollables>;  ///< Bit i: pollable i has something to receive.
+using Readable = std::bitset<k_max_pollables>;  ///< Bit i: pollable i is ready.
 
 /// Requires: at most k_max_pollables.
 [[nodiscard]] Readable wait_readable(std::span<const Pollable> pollables, TimeNs timeout);

@@ -44,6 +44,7 @@ enum class SendOutcome {
 struct Pollable {
     void* socket = nullptr;  ///< A ZeroMQ socket, or null:
     int descriptor = -1;     ///< a file descriptor.
+    bool to_send = false;    ///< Wait until it can send instead of until it can receive.
 };
 
 /// The ZeroMQ socket inside each of our sockets. Moves, closes, and keeps its context alive.

@@ -1,0 +1,22 @@
+#include "pathscope/net/context.hpp"
+
+#include <zmq.h>
+
+#include <cerrno>
+
+#include "pathscope/core/check.hpp"
+
+namespace pathscope {
+
+Context::Context(const ContextOptions& options) {
+    void* context = zmq_ctx_new();
+    CHECK(context != nullptr, zmq_strerror(errno));
+    CHECK(zmq_ctx_set(context, ZMQ_IO_THREADS, options.io_threads) == 0, options.io_threads);
+    CHECK(zmq_ctx_set(context, ZMQ_MAX_SOCKETS, options.max_sockets) == 0, options.max_sockets);
+    handle_ = std::shared_ptr<void>(context, [](void* last) {
+        while (zmq_ctx_term(last) != 0 && errno == EINTR) {
+        }
+    });
+}
+
+}  // namespace pathscope

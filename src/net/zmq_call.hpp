@@ -1,0 +1,39 @@
+#pragma once
+/// The few ZeroMQ calls that all sockets share. Plain C API: its errors are values, so no exception needs catching.
+
+#include <zmq.h>
+
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "pathscope/core/frames.hpp"
+#include "pathscope/core/result.hpp"
+#include "pathscope/net/context.hpp"
+#include "pathscope/net/socket.hpp"
+
+namespace pathscope {
+
+/// A new socket with the options all types share. Fails when the context has no socket left to give.
+[[nodiscard]] Result<SocketHandle> open_socket(const Context& context, int type,
+                                               const SocketOptions& options);
+
+void set_option(void* socket, int option, int value);
+void set_option(void* socket, int option, std::string_view value);
+
+[[nodiscard]] Result<void> bind_socket(void* socket, const std::string& endpoint);
+[[nodiscard]] Result<void> connect_socket(void* socket, const std::string& endpoint);
+[[nodiscard]] std::string bound_endpoint(void* socket);
+
+/// Sends all frames as one message, never blocking. Returns 0, or the errno of the first frame, in which case nothing was
+/// sent and nothing taken. The leading frame (an address) may be null.
+[[nodiscard]] int send_frames(void* socket, const std::string* leading, Frames& frames);
+
+/// The next message that is waiting; of one with more than k_max_frames, only the first ones are kept.
+[[nodiscard]] std::optional<Frames> receive_frames(void* socket);
+
+inline constexpr std::size_t k_max_frames = 8;
+
+}  // namespace pathscope
