@@ -20,7 +20,7 @@ bool is_background(float depth) { return depth <= 0 || std::isinf(depth); }
 /// multiplied by this once, and the loops only square and add.
 float guide_scale(float sigma) { return float(1 / (double(sigma) * std::sqrt(2.0))); }
 
-/// A picture as the loops want it: for each row, one array of `width` floats for every coordinate of a pixel.
+/// A picture as the loops want it: for each row, one array of floats for every coordinate of a pixel, `stride` apart.
 ///
 ///   0..2 normal, 3 log depth, 4..6 albedo, each over sigma * sqrt(2);  7..9 colour, demodulated if asked for
 ///
@@ -32,14 +32,15 @@ class Features {
     static constexpr int k_channels = k_guides + 3;
 
     Features(const Image& noisy, const Guides& guides, const BilateralParams& params, int threads)
-        : width_(std::size_t(noisy.width)), values_(noisy.pixels.size() * k_channels) {
+        : stride_(stride_for(std::size_t(noisy.width))),
+          values_(stride_ * k_channels * std::size_t(noisy.height)) {
         parallel_for(noisy.height, threads, [&](int y) {
             for (int x = 0; x < noisy.width; ++x) set_pixel(x, y, features_at(noisy, guides, params, x, y));
         });
     }
 
-    [[nodiscard]] std::size_t width() const { return width_; }
-    [[nodiscard]] const float* row(int y) const { return &values_[std::size_t(y) * k_channels * width_]; }
+    [[nodiscard]] std::size_t stride() const { return stride_; }
+    [[nodiscard]] const float* row(int y) const { return &values_[std::size_t(y) * k_channels * stride_]; }
 
     /// What the colour of a pixel is divided by before, and multiplied by after.
     static Rgb modulation(const Guides& guides, const BilateralParams& params, int x, int y) {
@@ -50,6 +51,10 @@ class Features {
 
   private:
     using Pixel = std::array<float, k_channels>;
+
+    /// One cache line more than a multiple of eight: with strides of a power of two (a width of 1024), all arrays of a
+    /// row would compete for the same few places of the cache.
+    static std::size_t stride_for(std::size_t width) { return (width + 127) / 128 * 128 + 16; }
 
     static Pixel features_at(const Image& noisy, const Guides& guides, const BilateralParams& params, int x,
                              int y) {
@@ -62,8 +67,7 @@ class Features {
 
         const Vec3 n = normal * guide_scale(params.sigma_normal);
         const Rgb a = albedo * guide_scale(params.sigma_albedo);
-        // Further from every surface than any sigma makes two surfaces.
-        constexpr float k_background = 1e9f;
+        constexpr float k_background = 1e9f;  // No surface comes near: |ln z| < 104, over k_min_filter_sigma.
         const float z =
             is_background(depth) ? k_background : portable_log(depth) * guide_scale(params.sigma_depth);
         return {n.x, n.y, n.z, z, a.x, a.y, a.z, colour.x, colour.y, colour.z};
@@ -71,10 +75,10 @@ class Features {
 
     void set_pixel(int x, int y, const Pixel& pixel) {
         for (std::size_t k = 0; k < k_channels; ++k)
-            values_[(std::size_t(y) * k_channels + k) * width_ + std::size_t(x)] = pixel[k];
+            values_[(std::size_t(y) * k_channels + k) * stride_ + std::size_t(x)] = pixel[k];
     }
 
-    std::size_t width_;
+    std::size_t stride_;
     std::vector<float> values_;
 };
 
@@ -87,41 +91,48 @@ struct RowSums {
 
 /// Adds to each of `count` pixels the one neighbour that lies at the same offset from it. The inner loop has no
 /// branch, and its iterations nothing in common: it becomes vector code.
-void add_neighbours(const float* own, const float* other, std::size_t width, std::size_t count, float spatial,
-                    float* __restrict weight, float* __restrict red, float* __restrict green,
+void add_neighbours(const float* own, const float* other, std::size_t stride, std::size_t count,
+                    float spatial, float* __restrict weight, float* __restrict red, float* __restrict green,
                     float* __restrict blue) {
     for (std::size_t i = 0; i < count; ++i) {
         float distance = spatial;
         for (std::size_t k = 0; k < Features::k_guides; ++k) {
-            const float difference = other[k * width + i] - own[k * width + i];
+            const float difference = other[k * stride + i] - own[k * stride + i];
             distance += difference * difference;
         }
         const float w = exp_negative(distance);
         weight[i] += w;
-        red[i] += w * other[(Features::k_guides + 0) * width + i];
-        green[i] += w * other[(Features::k_guides + 1) * width + i];
-        blue[i] += w * other[(Features::k_guides + 2) * width + i];
+        red[i] += w * other[(Features::k_guides + 0) * stride + i];
+        green[i] += w * other[(Features::k_guides + 1) * stride + i];
+        blue[i] += w * other[(Features::k_guides + 2) * stride + i];
     }
 }
 
-/// All neighbours of all pixels of row y, offset by offset: each pixel sees them in the same order whoever computes
-/// it.
-RowSums sum_row(const Features& features, const BilateralParams& params, int y, int height) {
-    const int width = int(features.width());
+/// All neighbours of the pixels [first, last) of row y, offset by offset: each pixel sees them in the same order
+/// whoever computes it.
+void add_all_neighbours(const Features& features, const BilateralParams& params, PixelRect frame, int y,
+                        int first, int last, RowSums& sums) {
     const float scale = guide_scale(params.sigma_spatial);
-    RowSums sums(features.width());
-    for (int dy = std::max(-params.radius, -y); dy <= std::min(params.radius, height - 1 - y); ++dy) {
+    for (int dy = std::max(-params.radius, -y); dy <= std::min(params.radius, frame.height - 1 - y); ++dy) {
         for (int dx = -params.radius; dx <= params.radius; ++dx) {
-            const int begin = std::max(0, -dx);
-            const int end = std::min(width, width - dx);
+            const int begin = std::max(first, -dx);
+            const int end = std::min(last, frame.width - dx);
             if (begin >= end) continue;
             const float spatial = float(dx * dx + dy * dy) * scale * scale;
-            add_neighbours(features.row(y) + begin, features.row(y + dy) + begin + dx, features.width(),
+            add_neighbours(features.row(y) + begin, features.row(y + dy) + begin + dx, features.stride(),
                            std::size_t(end - begin), spatial, &sums.weight[std::size_t(begin)],
                            &sums.red[std::size_t(begin)], &sums.green[std::size_t(begin)],
                            &sums.blue[std::size_t(begin)]);
         }
     }
+}
+
+/// A row in strips so short that what the inner loop reads again and again stays in the innermost cache.
+RowSums sum_row(const Features& features, const BilateralParams& params, PixelRect frame, int y) {
+    constexpr int k_strip = 128;
+    RowSums sums(std::size_t(frame.width));
+    for (int first = 0; first < frame.width; first += k_strip)
+        add_all_neighbours(features, params, frame, y, first, std::min(first + k_strip, frame.width), sums);
     return sums;
 }
 
@@ -158,7 +169,7 @@ Image joint_bilateral(const Image& noisy, const Guides& guides, const BilateralP
     const Features features(noisy, guides, params, threads);
     Image filtered(noisy.width, noisy.height);
     parallel_for(noisy.height, threads, [&](int y) {
-        const RowSums sums = sum_row(features, params, y, noisy.height);
+        const RowSums sums = sum_row(features, params, noisy.rect(), y);
         for (int x = 0; x < noisy.width; ++x) {
             const std::size_t i = std::size_t(x);
             // A pixel always counts itself with weight 1, unless it is not a number.
