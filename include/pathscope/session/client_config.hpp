@@ -29,7 +29,7 @@ struct ClientConfig {
     int min_servers = 0;  ///< Indirect light waits until so many are ready.
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;
-    BlockOrder order = BlockOrder::spiral;
+    UnitOrder order = UnitOrder::spiral;
     int block_size = 32;
     std::uint32_t round_samples = 4;
 

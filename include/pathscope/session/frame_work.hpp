@@ -1,0 +1,103 @@
+#pragma once
+/// The work of one frame: two accounts of rounds (direct, indirect) and the light that they brought.
+///
+///     image = direct / n_direct + indirect / n_indirect
+///
+/// Why one place: a round is merged if and only if its ledger accepts it, so that committing and adding cannot drift
+/// apart. Which server renders what, and over which wire, is the session's business.
+/// Direct rounds are the client's own; only indirect ones are counted in the event store, since only they can be lost.
+/// Thread safety: one thread at a time.   Test: tests/session/test_frame_work.cpp
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "pathscope/cluster/ledger.hpp"
+#include "pathscope/cluster/schedule.hpp"
+#include "pathscope/integrator/path_estimator.hpp"
+#include "pathscope/render/frame_sums.hpp"
+#include "pathscope/render/render_settings.hpp"
+
+namespace pathscope {
+
+struct WorkPlan {
+    int block_size = 32;
+    std::uint32_t round_samples = 4;
+    ScheduleKind schedule = ScheduleKind::pull;
+    UnitOrder order = UnitOrder::spiral;
+};
+
+class FrameWork {
+  public:
+    FrameWork(const WorkPlan& plan, EventStore& store);
+
+    /// Begins the frame anew: nothing of the epoch before reaches it. Returns the leases that were outstanding.
+    std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch, TimeNs now);
+
+    /// Who may be given indirect rounds.
+    void set_servers(std::vector<ServerShare> servers) { schedule_.set_servers(std::move(servers)); }
+
+    /// The next round for this server, granted for `duration(round, attempts)`.
+    template <class Duration>
+    std::optional<Lease> grant_indirect(ServerId server, TimeNs now, Duration&& duration) {
+        const std::optional<RoundKey> key = schedule_.pick(indirect_.ledger, server);
+        if (!key) return std::nullopt;
+        return indirect_.ledger.grant(server, *key, now,
+                                      duration(round_of(*key), indirect_.ledger.attempts(*key)));
+    }
+    std::optional<Lease> grant_direct(TimeNs now);
+    void release_direct(const Lease& lease, TimeNs now) {
+        direct_.ledger.release(lease.id, lease.server, now);
+    }
+
+    [[nodiscard]] Round round_of(const Lease& lease) const {
+        return grid_.round(lease.unit, lease.first, lease.count);
+    }
+
+    /// Books a result and, if it is accepted, adds its light.
+    Commit commit(LightPart part, const ResultClaim& claim, std::span<const PixelSum> sums, TimeNs now);
+
+    [[nodiscard]] Ledger& indirect_ledger() { return indirect_.ledger; }
+    [[nodiscard]] const Ledger& indirect_ledger() const { return indirect_.ledger; }
+    [[nodiscard]] const FrameSums& direct() const { return direct_.sums; }
+    [[nodiscard]] const FrameSums& indirect() const { return indirect_.sums; }
+    [[nodiscard]] Epoch epoch() const { return epoch_; }
+
+    /// Share of the samples that are in the image, 0 to 1.
+    [[nodiscard]] double direct_progress() const { return progress(direct_); }
+    [[nodiscard]] double indirect_progress() const { return progress(indirect_); }
+    [[nodiscard]] bool direct_complete() const { return complete(direct_); }
+    [[nodiscard]] bool complete() const { return complete(direct_) && complete(indirect_); }
+
+    /// Whether each block has at least one round of each part that is asked for: only then a picture can be made.
+    [[nodiscard]] bool has_image() const { return has_image(direct_) && has_image(indirect_); }
+
+    /// No more rounds: what is there makes the image.
+    void stop();
+
+  private:
+    struct Part {
+        Ledger ledger;
+        FrameSums sums;
+        std::uint32_t samples = 0;
+        std::uint32_t units_begun = 0;  ///< Blocks with at least one round committed.
+    };
+
+    [[nodiscard]] Round round_of(RoundKey key) const;
+    [[nodiscard]] double progress(const Part& part) const;
+    [[nodiscard]] bool complete(const Part& part) const {
+        return part.samples == 0 || part.ledger.complete();
+    }
+    [[nodiscard]] bool has_image(const Part& part) const {
+        return part.samples == 0 || part.units_begun == grid_.count();
+    }
+    std::vector<Lease> begin(Part& part, std::uint32_t samples, Quantum quantum, TimeNs now);
+
+    WorkPlan plan_;
+    BlockGrid grid_;
+    Epoch epoch_;
+    Part direct_, indirect_;
+    Schedule schedule_, direct_schedule_;
+};
+
+}  // namespace pathscope

@@ -1,0 +1,30 @@
+#pragma once
+/// `--stats`: what a run did, as JSON, made from the event store and the finished frame.
+///
+/// Keys are a contract (docs/programs.md): scripts read them. rounds == rounds_committed says that every round of indirect light was
+/// counted exactly once.
+/// Units: seconds for *_s, milliseconds for *_ms, bytes. Thread safety: pure.   Test: tests/session/test_stats.cpp
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pathscope/core/hash.hpp"
+#include "pathscope/image/dropped_sample.hpp"
+#include "pathscope/probe/event_store.hpp"
+#include "pathscope/session/render_state.hpp"
+
+namespace pathscope {
+
+/// What the store does not know.
+struct RunFigures {
+    double wall_s = 0, load_s = 0, build_s = 0, render_s = 0;
+    int threads = 0;
+    Digest image_hash{};
+    std::uint64_t saturated = 0;
+    std::vector<DroppedSample> dropped;  ///< Some of those counted as nonfinite_dropped.
+};
+
+[[nodiscard]] std::string stats_json(const RenderState& state, const EventStore& store, const RunFigures& figures);
+
+}  // namespace pathscope

@@ -1,0 +1,83 @@
+#include "pathscope/session/round_runner.hpp"
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+
+#include "pathscope/render/tile_filter.hpp"
+
+namespace pathscope {
+
+/// A flag that render loops read cheaply, and that wakes whoever waits for time to pass.
+class RoundRunner::Cancellation {
+  public:
+    void cancel() {
+        {
+            const std::lock_guard lock(mutex_);
+            flag_.store(true, std::memory_order_relaxed);
+        }
+        changed_.notify_all();
+    }
+
+    [[nodiscard]] const CancelFlag& flag() const { return flag_; }
+
+    /// Waits until then, or until cancelled.
+    void wait_until(TimeNs moment) {
+        std::unique_lock lock(mutex_);
+        const auto left = std::chrono::nanoseconds(moment - monotonic_now());
+        changed_.wait_for(lock, left, [this] { return flag_.load(std::memory_order_relaxed); });
+    }
+
+  private:
+    CancelFlag flag_{false};
+    std::mutex mutex_;
+    std::condition_variable changed_;
+};
+
+RoundRunner::RoundRunner(const WakePair& wake, int threads, double samples_per_second)
+    : threads_(threads), samples_per_second_(samples_per_second), finished_(wake) {}
+
+RoundRunner::~RoundRunner() { cancel_all(); }
+
+void RoundRunner::begin(RoundJob job) {
+    auto cancellation = std::make_shared<Cancellation>();
+    CHECK(cancellations_.emplace(job.ticket, cancellation).second, job.ticket);
+    worker_.post([this, job = std::move(job), cancellation] { finished_.put(run(job, *cancellation)); });
+}
+
+void RoundRunner::cancel(std::uint64_t ticket) {
+    if (const auto found = cancellations_.find(ticket); found != cancellations_.end())
+        found->second->cancel();
+}
+
+void RoundRunner::cancel_all() {
+    for (const auto& [ticket, cancellation] : cancellations_) cancellation->cancel();
+}
+
+std::vector<RoundOutcome> RoundRunner::take_finished() {
+    std::vector<RoundOutcome> outcomes = finished_.take_all();
+    for (const RoundOutcome& outcome : outcomes) cancellations_.erase(outcome.ticket);
+    return outcomes;
+}
+
+RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) const {
+    RoundOutcome outcome{job.ticket, job.part, job.round, std::nullopt, {}, monotonic_now(), 0};
+    try {
+        outcome.result = render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_,
+                                      &cancellation.flag());
+        if (outcome.result && job.part == LightPart::indirect && job.settings.filter == FilterPlace::server)
+            outcome.result->sums =
+                filter_tile(*job.scene, job.camera, job.settings, job.round, outcome.result->sums, threads_);
+    } catch (const std::exception& error) {
+        outcome.failure = error.what();  // Out of memory: nothing else here throws.
+    }
+    if (outcome.result && samples_per_second_ > 0) {
+        const double seconds = double(outcome.result->samples) / samples_per_second_;
+        cancellation.wait_until(outcome.started + from_seconds(seconds));
+    }
+    outcome.duration = monotonic_now() - outcome.started;
+    return outcome;
+}
+
+}  // namespace pathscope

@@ -1,0 +1,74 @@
+#include "pathscope/session/stats.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "pathscope/session/build_identity.hpp"
+
+namespace pathscope {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double per_second(std::uint64_t count, double seconds) { return seconds > 0 ? double(count) / seconds : 0; }
+
+Json servers_json(const EventStore& store) {
+    Json servers = Json::array();
+    for (const ServerSummary& server : store.servers()) {
+        if (server.id == k_local_server) continue;
+        const LatencySummary& rtt = server.latency(Latency::heartbeat);
+        const LatencySummary& tile = server.latency(Latency::tile);
+        servers.push_back({{"id", server.id.value},
+                           {"name", server.name},
+                           {"samples", server.total(Counter::samples)},
+                           {"tiles", server.total(Counter::tiles)},
+                           {"rays", server.total(Counter::rays)},
+                           {"bytes", server.total(Counter::bytes_in)},
+                           {"rtt_ms_p50", rtt.p50_ms},
+                           {"rtt_ms_p95", rtt.p95_ms},
+                           {"tile_ms_p50", tile.p50_ms},
+                           {"tile_ms_p95", tile.p95_ms},
+                           {"died", server.total(Counter::died) > 0}});
+    }
+    return servers;
+}
+
+}  // namespace
+
+std::string stats_json(const RenderState& state, const EventStore& store, const RunFigures& figures) {
+    const CounterTotals totals = store.totals();
+    const auto total = [&](Counter counter) { return totals[std::size_t(counter)]; };
+    const auto local = store.server(k_local_server);
+
+    Json json{{"version", program_version()},
+              {"build", build_identity()},
+              {"scene", state.scene.name},
+              {"width", state.settings.width},
+              {"height", state.settings.height},
+              {"spp", state.settings.spp},
+              {"direct_spp", state.settings.direct_spp},
+              {"seed", state.settings.seed},
+              {"threads", figures.threads},
+              {"wall_s", figures.wall_s},
+              {"load_s", figures.load_s},
+              {"build_s", figures.build_s},
+              {"render_s", figures.render_s},
+              {"rays", total(Counter::rays)},
+              {"rays_per_s", per_second(total(Counter::rays), figures.render_s)},
+              {"samples", total(Counter::samples)},
+              {"samples_per_s", per_second(total(Counter::samples), figures.render_s)},
+              {"image_hash", to_hex(figures.image_hash)},
+              {"quantum_exponent", state.settings.quantum.exponent},
+              {"servers", servers_json(store)},
+              {"client", {{"samples", local ? local->total(Counter::samples) : 0},
+                          {"rays", local ? local->total(Counter::rays) : 0}}}};
+    // The counters have one name everywhere; those above have the units that people expect.
+    for (const auto& [counter, name] : k_counter_names)
+        if (!json.contains(name)) json[std::string(name)] = total(counter);
+    json["saturated"] = figures.saturated;
+    json["dropped_samples"] = Json::array();
+    for (const DroppedSample& dropped : figures.dropped)
+        json["dropped_samples"].push_back({{"x", dropped.x}, {"y", dropped.y}, {"sample", dropped.sample}});
+    return json.dump(2) + "\n";
+}
+
+}  // namespace pathscope

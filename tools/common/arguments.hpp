@@ -1,0 +1,65 @@
+#pragma once
+/// What the command lines of all programs share: levers by name, ports, and errors as one sentence.
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pathscope/core/enum_names.hpp"
+#include "pathscope/core/result.hpp"
+#include "pathscope/session/build_identity.hpp"
+
+namespace pathscope {
+
+/// --NAME a|b|c, checked against the enum's table.
+template <class E>
+CLI::Option* add_lever(CLI::App& app, const std::string& flag, E& value, const std::string& help) {
+    std::vector<std::string> names;
+    for (const auto& entry : enum_table(E{})) names.emplace_back(entry.name);
+    const auto assign = [&value](const std::string& word) { value = *from_name<E>(word); };
+    return app.add_option_function<std::string>(flag, assign, help + " (" + std::string(name_of(value)) + ")")
+        ->check(CLI::IsMember(names))
+        ->type_name(joined_names<E>());
+}
+
+/// "5555,5556,5557" -> three ports from 1 to 65535.
+inline CLI::Option* add_ports(CLI::App& app, std::array<int, 3>& ports) {
+    const auto assign = [&ports](const std::string& text) {
+        const std::vector<std::string> parts = CLI::detail::split(text, ',');
+        bool good = parts.size() == ports.size();
+        for (std::size_t i = 0; good && i < ports.size(); ++i)
+            good = CLI::detail::lexical_cast(parts[i], ports[i]) && ports[i] >= 1 && ports[i] <= 65535;
+        if (!good)
+            throw CLI::ValidationError("--ports", "'" + text + "' is not three ports from 1 to 65535, as in 5555,5556,5557");
+    };
+    return app.add_option_function<std::string>("--ports", assign, "input, monitor and frames (5555,5556,5557)")
+        ->type_name("A,B,C");
+}
+
+/// Parses; gives the text to print for --help and --version, nothing when the program shall go on.
+inline Result<std::optional<std::string>> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
+    app.set_version_flag("--version", app.get_name() + " " + program_version());
+    app.get_formatter()->column_width(34);
+    try {
+        app.parse(argc, argv);
+        return std::optional<std::string>();
+    } catch (const CLI::CallForHelp&) {
+        return std::optional(app.help());
+    } catch (const CLI::CallForVersion&) {
+        return std::optional(app.version() + "\n");
+    } catch (const CLI::ParseError& error) {
+        std::string sentence = error.what();
+        while (!sentence.empty() && (sentence.back() == '.' || sentence.back() == '\n')) sentence.pop_back();
+        return bad_input(sentence + ". See " + app.get_name() + " --help.");
+    }
+}
+
+/// For main(): prints the error; the exit code that it leads to.
+inline int report(const std::string& program, const Error& error) {
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), error.message.c_str());
+    return error.kind == ErrorKind::bad_input ? 2 : 1;
+}
+
+}  // namespace pathscope

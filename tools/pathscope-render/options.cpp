@@ -1,0 +1,156 @@
+#include "options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "../common/arguments.hpp"
+
+namespace pathscope {
+namespace {
+
+/// "640x360" -> {640, 360}
+std::pair<int, int> parse_size(const std::string& text) {
+    const std::size_t cross = text.find('x');
+    std::pair<int, int> size;
+    const bool good = cross != std::string::npos && CLI::detail::lexical_cast(text.substr(0, cross), size.first) &&
+                      CLI::detail::lexical_cast(text.substr(cross + 1), size.second) && size.first >= 1 &&
+                      size.second >= 1 && size.first <= k_max_image_side && size.second <= k_max_image_side;
+    if (!good)
+        throw CLI::ValidationError("--size", fmt::format("'{}' is not a size from 1x1 to {}x{}, as in 640x360", text,
+                                                         k_max_image_side, k_max_image_side));
+    return size;
+}
+
+void add_image_options(CLI::App& app, RenderOptions& options) {
+    app.add_option("SCENE", options.scene, "a scene file (.json), or a bare .obj")->required();
+    app.add_option("-o,--output", options.outputs, "an .exr (layers), .png or .pfm; may be given again")
+        ->required()
+        ->allow_extra_args(false)
+        ->type_name("FILE");
+    app.add_option("--camera", options.camera, "one of the scene's cameras, by name (the first)")->type_name("NAME");
+    app.add_option_function<std::string>(
+           "--size", [&](const std::string& text) { options.size = parse_size(text); }, "pixels")
+        ->type_name("WxH");
+    const CLI::Range samples(1, int(k_max_samples_per_pixel));
+    app.add_option("--spp", options.spp, "indirect samples per pixel (16)")->check(samples)->type_name("N");
+    app.add_option("--direct-spp", options.direct_spp, "direct samples per pixel (as --spp)")
+        ->check(samples)
+        ->type_name("N");
+    app.add_option_function<double>(
+           "--seconds", [&](double seconds) { options.client.time_limit = from_seconds(seconds); },
+           "stop after this time instead")
+        ->check(CLI::Range(0.001, 1e7))
+        ->type_name("T");
+    app.add_option("--bounces", options.bounces, "longest path, in bounces; 0 = no limit (0)")
+        ->check(CLI::Range(0, 1'000'000))
+        ->type_name("N");
+    app.add_option("--seed", options.settings.seed, "of the random numbers (1)")->type_name("N");
+    app.add_option("--exposure", options.exposure_ev, "of a .png, in stops (the scene's)")
+        ->check(CLI::Range(-50.0, 50.0))
+        ->type_name("EV");
+    app.add_option("--buffers", options.buffers, "further layers of an .exr")
+        ->delimiter(',')
+        ->check(CLI::IsMember(std::vector<std::string>(k_buffer_names.begin(), k_buffer_names.end())))
+        ->type_name("A,B,C");
+    const auto direct = app.add_flag("--direct-only", options.direct_only, "leave indirect light out");
+    app.add_flag("--indirect-only", options.indirect_only, "leave direct light out")->excludes(direct);
+}
+
+void add_levers(CLI::App& app, RenderOptions& options) {
+    TransportSettings& transport = options.settings.transport;
+    add_lever(app, "--light", transport.light, "how a light is picked");
+    add_lever(app, "--hemisphere", transport.hemisphere, "how the next direction is drawn");
+    add_lever(app, "--mis", transport.mis, "how light and BRDF samples are weighed");
+    add_lever(app, "--roulette", transport.roulette.kind, "when a path ends");
+    add_lever(app, "--sampler", transport.sampler, "where random numbers come from");
+    add_lever(app, "--material", options.scene_options.material, "how materials are taken");
+    app.add_option_function<std::string>(
+           "--smoothing", [&](const std::string& word) { options.scene_options.smoothing = word == "on"; },
+           "normals where the OBJ gives none: smooth within smoothing groups, or flat (on)")
+        ->check(CLI::IsMember({"on", "off"}))
+        ->type_name("on|off");
+    add_lever(app, "--filter", options.settings.filter, "joint bilateral filter of indirect light");
+    app.add_option("--filter-radius", options.settings.bilateral.radius,
+                   fmt::format("in pixels ({})", options.settings.bilateral.radius))
+        ->check(CLI::Range(0, k_max_filter_radius))
+        ->type_name("N");
+}
+
+void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) {
+    ClientConfig& client = options.client;
+    app.add_option("--servers", client.local_servers, "local servers to start; 0 = render here (0)")
+        ->check(CLI::Range(0, 256))
+        ->type_name("N");
+    app.add_option_function<std::string>(
+           "--listen",
+           [&](const std::string& address) {
+               client.listens = true;
+               client.host = address;
+           },
+           "wait for servers at this address")
+        ->type_name("ADDR");
+    app.add_flag("--insecure", insecure, "listen on other addresses than this machine's own, without keys");
+    app.add_option("--min-servers", client.min_servers, "begin when so many are ready (1 with --listen)")
+        ->check(CLI::Range(0, 4096))
+        ->type_name("N");
+    add_ports(app, client.ports);
+    add_lever(app, "--schedule", client.schedule, "who renders which block");
+    add_lever(app, "--detector", client.detector, "when a silent server counts as dead");
+    add_lever(app, "--order", client.order, "which blocks come first");
+    app.add_option("--block", client.block_size, "pixels along a block's side (32)")
+        ->check(CLI::Range(1, k_max_block_size))
+        ->type_name("N");
+    app.add_option("--round", client.round_samples, "samples per pixel in one round (4)")
+        ->check(CLI::Range(1, 4096))
+        ->type_name("N");
+    app.add_option("--threads", client.threads, "of the client's own rendering; 0 = all cores (0)")
+        ->check(CLI::Range(0, 1024))
+        ->type_name("N");
+    app.add_option("--stats", options.stats, "write figures of the run as JSON")->type_name("FILE");
+    app.add_option("--trace", options.trace, "write a time line for ui.perfetto.dev")->type_name("FILE");
+}
+
+bool is_loopback(const std::string& host) {
+    return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
+}
+
+}  // namespace
+
+Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const char* const* argv) {
+    RenderOptions options;
+    bool insecure = false;
+    CLI::App app("Renders a scene to an image, alone or with render servers.", "pathscope-render");
+
+    // The setting comes first whatever its place on the command line: single levers are pulled on top of it.
+    Setting setting = Setting::best;
+    for (int i = 1; i < argc; ++i) {
+        const std::string word = argv[i];
+        const std::string value = word.rfind("--setting=", 0) == 0          ? word.substr(10)
+                                  : word == "--setting" && i + 1 < argc ? argv[i + 1]
+                                                                        : "";
+        if (const auto named = from_name<Setting>(value)) setting = *named;
+    }
+    options.settings.transport = make_settings(setting);
+
+    add_image_options(app, options);
+    add_lever(app, "--setting", setting, "all levers at once");
+    add_levers(app, options);
+    add_cluster_options(app, options, insecure);
+
+    auto text = parse_arguments(app, argc, argv);
+    if (!text) return text.error();
+    if (*text) return std::variant<RenderOptions, std::string>(**text);
+
+    options.client.ports_were_chosen = app.count("--ports") > 0;
+    if (options.client.listens) {
+        if (!is_loopback(options.client.host) && !insecure)
+            return bad_input(fmt::format("--listen {}: other machines could reach this address, and nothing is "
+                                         "encrypted or checked. Add --insecure if the network is trusted.",
+                                         options.client.host));
+        if (app.count("--min-servers") == 0) options.client.min_servers = 1;
+    }
+    return std::variant<RenderOptions, std::string>(std::move(options));
+}
+
+}  // namespace pathscope

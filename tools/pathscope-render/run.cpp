@@ -1,0 +1,176 @@
+#include "run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "pathscope/core/files.hpp"
+#include "pathscope/core/log.hpp"
+#include "pathscope/core/parallel_for.hpp"
+#include "pathscope/image/image_hash.hpp"
+#include "pathscope/image/io.hpp"
+#include "pathscope/probe/trace_export.hpp"
+#include "pathscope/render/rendered_frame.hpp"
+#include "pathscope/session/client_session.hpp"
+#include "pathscope/session/stats.hpp"
+#include "progress_line.hpp"
+
+namespace pathscope {
+namespace {
+
+constexpr TimeNs k_longest_step = 200 * k_millisecond_ns;
+constexpr std::uint32_t k_default_spp = 16;
+constexpr int k_default_width = 640;
+
+/// Everything that can be refused is refused before the scene is loaded.
+Result<void> check_outputs(const RenderOptions& options) {
+    for (const auto& output : options.outputs)
+        if (const auto ok = check_writable(output); !ok) return ok;
+    for (const auto& file : {options.stats, options.trace})
+        if (file)
+            if (const auto ok = write_file_atomically(*file, ""); !ok) return ok;
+    return {};
+}
+
+Result<CameraSpec> choose_camera(const SceneFile& scene, const std::string& name) {
+    if (name.empty()) return scene.cameras.front();
+    if (const CameraSpec* camera = find_camera(scene, name)) return *camera;
+    std::string names;
+    for (const CameraSpec& camera : scene.cameras) names += (names.empty() ? "" : ", ") + camera.name;
+    return bad_input(fmt::format("--camera {}: the scene has no camera of that name; it has {}.", name, names));
+}
+
+std::pair<int, int> choose_size(const RenderOptions& options, const SceneFile& scene, const CameraSpec& camera) {
+    if (options.size) return *options.size;
+    if (const auto& size = scene.defaults.size) return {size->width, size->height};
+    const Aspect aspect = camera.aspect.value_or(Aspect{});
+    return {k_default_width, std::max(1, k_default_width * aspect.height / aspect.width)};
+}
+
+/// What the command line left open, the scene decides.
+Result<RenderState> make_state(const RenderOptions& options, const SceneFile& file, const Scene& scene) {
+    const Result<CameraSpec> camera = choose_camera(file, options.camera);
+    if (!camera) return camera.error();
+    RenderState state;
+    state.scene = file;
+    state.options = options.scene_options;
+    state.camera = camera->view;
+    state.settings = options.settings;
+    RenderSettings& settings = state.settings;
+    std::tie(settings.width, settings.height) = choose_size(options, file, *camera);
+    const std::uint32_t default_spp = options.client.time_limit > 0 ? k_max_samples_per_pixel
+                                      : file.defaults.spp           ? std::uint32_t(*file.defaults.spp)
+                                                                    : k_default_spp;
+    settings.spp = options.spp.value_or(default_spp);
+    settings.direct_spp = options.direct_spp.value_or(settings.spp);
+    settings.transport.max_bounces = options.bounces.value_or(file.defaults.bounces.value_or(0));
+    if (options.direct_only) settings.spp = 0;
+    if (options.indirect_only) settings.direct_spp = 0;
+    settings.quantum = quantum_for(scene.typical_radiance, scene.brightest_radiance);
+    return state;
+}
+
+/// The layers of an .exr; the first is what .png and .pfm hold. Pictures live as long as `buffers`.
+struct Buffers {
+    RenderedFrame frame;
+    Guides guides;
+    Plane samples;
+};
+std::vector<ImageLayer> make_layers(const Buffers& buffers, const std::vector<std::string>& names) {
+    std::vector<ImageLayer> layers{{"combined", &buffers.frame.combined}};
+    for (const std::string& name : names) {
+        if (name == "direct") layers.push_back({name, &buffers.frame.direct});
+        if (name == "indirect") layers.push_back({name, &buffers.frame.indirect});
+        if (name == "unfiltered") layers.push_back({name, &buffers.frame.unfiltered});
+        if (name == "albedo") layers.push_back({name, &buffers.guides.albedo});
+        if (name == "normal") layers.push_back({name, &buffers.guides.normal});
+        if (name == "depth") layers.push_back({"depth.Z", &buffers.guides.depth});
+        if (name == "spp") layers.push_back({name, &buffers.samples});
+    }
+    return layers;
+}
+
+bool needs_guides(const RenderState& state, const std::vector<std::string>& buffers) {
+    return state.settings.filter == FilterPlace::client ||
+           std::any_of(buffers.begin(), buffers.end(),
+                       [](const auto& name) { return name == "albedo" || name == "normal" || name == "depth"; });
+}
+
+ClientConfig complete_config(const RenderOptions& options) {
+    ClientConfig config = options.client;
+    config.server_program = program_folder() / "pathscope-server";
+    if (config.local_servers > 0)
+        config.local_server_threads = std::max(1, hardware_threads() / config.local_servers);
+    return config;
+}
+
+Result<void> render(ClientSession& session, const std::atomic<bool>& interrupted) {
+    ProgressLine line;
+    const auto& endpoints = session.endpoints();
+    if (session.progress().waiting)
+        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST", endpoints[1]));
+    while (!session.complete()) {
+        session.step(k_longest_step);
+        line.show(session.progress());
+        if (interrupted.load()) return failed("Interrupted; nothing was written.");
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& interrupted) {
+    const TimeNs begin = monotonic_now();
+    if (const auto ok = check_outputs(options); !ok) return ok;
+
+    Result<OpenedScene> opened = open_scene(options.scene, options.scene_options);
+    if (!opened) return opened.error();
+    const TimeNs loaded = monotonic_now();
+    Result<Scene> scene = make_scene(opened->file, std::move(opened->parts), options.client.threads);
+    if (!scene) return scene.error();
+    const TimeNs built = monotonic_now();
+    const Result<RenderState> state = make_state(options, opened->file, *scene);
+    if (!state) return state.error();
+
+    EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
+    const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
+    auto session = ClientSession::create(complete_config(options), {*state, shared_scene, SceneDepot(*opened->files)},
+                                         store);
+    if (!session) return session.error();
+    if (const auto done = render(**session, interrupted); !done) return done;
+    const TimeNs rendered = monotonic_now();
+
+    // The picture, and what was asked for beside it.
+    const FrameWork& work = (*session)->work();
+    const RenderSettings& settings = state->settings;
+    Buffers buffers;
+    if (needs_guides(*state, options.buffers))
+        buffers.guides = render_guides(*shared_scene, state->camera, settings,
+                                       {0, 0, settings.width, settings.height}, options.client.threads);
+    buffers.frame = compose_frame(work.direct(), work.indirect(), settings, buffers.guides, options.client.threads);
+    buffers.samples = settings.spp > 0 ? work.indirect().samples() : work.direct().samples();
+    SaveOptions save;
+    save.tone_map.exposure_ev = options.exposure_ev.value_or(opened->file.exposure_ev);
+    const std::vector<ImageLayer> layers = make_layers(buffers, options.buffers);
+    for (const auto& output : options.outputs)
+        if (const auto saved = save_image(output, layers, save); !saved) return saved;
+
+    RunFigures figures;
+    figures.load_s = to_seconds(loaded - begin);
+    figures.build_s = to_seconds(built - loaded);
+    figures.render_s = to_seconds(rendered - built);
+    figures.threads = options.client.threads > 0 ? options.client.threads : hardware_threads();
+    figures.image_hash = image_hash(buffers.frame.combined);
+    figures.saturated = (*session)->saturated();
+    figures.dropped = (*session)->dropped();
+    session->reset();  // Ends the local servers.
+    if (options.trace)
+        if (const auto written = write_trace(store, *options.trace); !written) return written;
+    figures.wall_s = to_seconds(monotonic_now() - begin);
+    if (options.stats) return write_file_atomically(*options.stats, stats_json(*state, store, figures));
+    return {};
+}
+
+}  // namespace pathscope

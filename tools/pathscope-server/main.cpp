@@ -1,0 +1,62 @@
+/// pathscope-server: renders indirect light for a client. No display needed.
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+
+#include "../common/arguments.hpp"
+#include "pathscope/core/log.hpp"
+#include "pathscope/session/server_session.hpp"
+
+namespace {
+std::atomic<pathscope::ServerSession*> g_session{nullptr};
+void stop(int) {
+    if (pathscope::ServerSession* session = g_session.load()) session->request_stop();
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace pathscope;
+    ServerConfig config;
+    config.cache_folder = SceneCache::default_folder();
+    bool quiet = false;
+    CLI::App app("Renders indirect light for a client; goes on trying until told to stop (Ctrl+C).", "pathscope-server");
+    app.add_option("--connect", config.host, "host of the client (127.0.0.1)")->type_name("HOST");
+    add_ports(app, config.ports);
+    app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
+        ->check(CLI::Range(0, 1024))
+        ->type_name("N");
+    app.add_option("--speed-cap", config.samples_per_second, "render no faster, in samples per second; 0 = no cap (0)")
+        ->check(CLI::Range(0.0, 1e12))
+        ->type_name("N");
+    app.add_option("--name", config.name, "for people (host name and process id)")
+        ->check(CLI::Validator(
+            [](const std::string& name) {
+                return name.empty() || name.size() > 64 ? std::string("a name has 1 to 64 bytes") : std::string();
+            },
+            "NAME"))
+        ->type_name("NAME");
+    app.add_option("--cache", config.cache_folder, "folder for scene files, by content; safe to delete")
+        ->type_name("DIR");
+    app.add_flag("--quiet", quiet, "say only what is wrong");
+    const auto text = parse_arguments(app, argc, argv);
+    if (!text) return report("pathscope-server", text.error());
+    if (*text) {
+        std::fputs((*text)->c_str(), stdout);
+        return 0;
+    }
+    if (quiet)
+        set_log_sink([](LogLevel level, std::string_view sentence) {
+            if (level == LogLevel::warning)
+                std::fprintf(stderr, "warning: %.*s\n", int(sentence.size()), sentence.data());
+        });
+
+    const auto session = ServerSession::create(config);
+    if (!session) return report("pathscope-server", session.error());
+    g_session.store(session->get());
+    std::signal(SIGINT, stop);
+    std::signal(SIGTERM, stop);
+    const auto done = (*session)->run();
+    g_session.store(nullptr);
+    return done ? 0 : report("pathscope-server", done.error());
+}
