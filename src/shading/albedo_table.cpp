@@ -60,14 +60,20 @@ LobeAlbedos mix(const LobeAlbedos& a, const LobeAlbedos& b, float t) {
 
 }  // namespace
 
-LobeAlbedos lobe_albedos(float cosine, float roughness) {
+AlbedoRow::AlbedoRow(float roughness) {
     static const Table table;
-    const float x = column_of(cosine), y = row_of(roughness);
-    const int column = std::min(int(x), k_nodes - 2), row = std::min(int(y), k_nodes - 2);
-    const auto &low = table.nodes[row], &high = table.nodes[row + 1];
-    const float across = x - float(column);
-    return mix(mix(low[column], low[column + 1], across), mix(high[column], high[column + 1], across),
-               y - float(row));
+    const float y = row_of(roughness);
+    const int row = std::min(int(y), k_nodes - 2);
+    low_ = table.nodes[row].data();
+    high_ = table.nodes[row + 1].data();
+    between_ = y - float(row);
+}
+
+LobeAlbedos AlbedoRow::at(float cosine) const {
+    const float x = column_of(cosine);
+    const int column = std::min(int(x), k_nodes - 2);
+    return mix(mix(low_[column], high_[column], between_), mix(low_[column + 1], high_[column + 1], between_),
+               x - float(column));
 }
 
 }  // namespace pathscope

@@ -90,39 +90,42 @@ BsdfSample sample_delta(const ThinGlass& surface, Vec3 outgoing, float u_lobe) {
     return straight_sample(outgoing, surface.tint);
 }
 
-// ---- Samples of the others: a direction, then its value and density.
+// ---- Samples of the others: a direction with its value and density.
 
-Vec3 sample_smooth(const Lambert&, Vec3, float, Vec2 u) { return sample_cosine_hemisphere(u); }
-Vec3 sample_smooth(const StandardSurface& surface, Vec3 outgoing, float u_lobe, Vec2 u) {
+DirectionSample sample_lobes(const Lambert& surface, Vec3 outgoing, float, Vec2 u) {
+    const Vec3 incoming = sample_cosine_hemisphere(u);
+    return {incoming, evaluate(surface, outgoing, incoming)};
+}
+
+DirectionSample sample_lobes(const StandardSurface& surface, Vec3 outgoing, float u_lobe, Vec2 u) {
     return sample_standard(surface, outgoing, u_lobe, u);
 }
 
 template <class Smooth>
-std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Smooth& surface, Vec3 outgoing,
+DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& surface, Vec3 outgoing, Vec2 u) {
+    const Vec3 incoming =
+        sampling == HemisphereSampling::uniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
+    const Rgb value = evaluate(surface, outgoing, incoming).value;
+    return {incoming, {value, hemisphere_pdf(sampling, outgoing, incoming)}};
+}
+
+template <class Kind>
+std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind& surface, Vec3 outgoing,
                                          float u_lobe, Vec2 u) {
-    if constexpr (k_is_delta<Smooth>) {
+    if constexpr (k_is_delta<Kind>) {
         return sample_delta(surface, outgoing, u_lobe);
     } else {
         if (outgoing.z <= 0) return std::nullopt;
+        const DirectionSample drawn = sampling == HemisphereSampling::bsdf
+                                          ? sample_lobes(surface, outgoing, u_lobe, u)
+                                          : sample_hemisphere(sampling, surface, outgoing, u);
+        const float pdf = drawn.value.pdf_solid_angle;
+        if (!(pdf > 0)) return std::nullopt;
         BsdfSample sample;
-        switch (sampling) {
-            case HemisphereSampling::uniform:
-                sample.incoming = sample_uniform_hemisphere(u);
-                break;
-            case HemisphereSampling::cosine:
-                sample.incoming = sample_cosine_hemisphere(u);
-                break;
-            case HemisphereSampling::bsdf:
-                sample.incoming = sample_smooth(surface, outgoing, u_lobe, u);
-                break;
-        }
-        const BsdfValue value = evaluate(surface, outgoing, sample.incoming);
-        sample.value = value.value;
-        sample.pdf_solid_angle = sampling == HemisphereSampling::bsdf
-                                     ? value.pdf_solid_angle
-                                     : hemisphere_pdf(sampling, outgoing, sample.incoming);
-        if (!(sample.pdf_solid_angle > 0)) return std::nullopt;
-        sample.weight = sample.value * (sample.incoming.z / sample.pdf_solid_angle);
+        sample.incoming = drawn.incoming;
+        sample.value = drawn.value.value;
+        sample.pdf_solid_angle = pdf;
+        sample.weight = sample.value * (sample.incoming.z / pdf);
         return sample;
     }
 }

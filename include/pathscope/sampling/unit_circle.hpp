@@ -26,16 +26,10 @@ namespace pathscope {
 [[nodiscard]] constexpr Vec2 unit_circle(float turns) {
     const int quarter = int(4 * turns + 0.5f);  // the nearest of the four axes (4 is 0 again)
     const Vec2 p = cos_sin_small((4 * turns - float(quarter)) * (k_pi / 2));
-    switch (quarter & 3) {
-        case 0:
-            return p;
-        case 1:
-            return {-p.y, p.x};
-        case 2:
-            return {-p.x, -p.y};
-        default:
-            return {p.y, -p.x};
-    }
+    // Turned by quarters without a branch, which random numbers would make the processor guess wrong.
+    const bool odd = quarter & 1;
+    const float cosine = odd ? p.y : p.x, sine = odd ? p.x : p.y;
+    return {(quarter + 1) & 2 ? -cosine : cosine, quarter & 2 ? -sine : sine};
 }
 
 }  // namespace pathscope

@@ -22,11 +22,12 @@ namespace pathscope {
 
 [[nodiscard]] inline Vec2 sample_disc(Vec2 u) {
     const float a = 2 * u.x - 1, b = 2 * u.y - 1;
-    if (a == 0 && b == 0) return {0, 0};
     // Squares around the centre become circles; a negative radius reaches the other half.
-    if (std::abs(a) > std::abs(b)) return cos_sin_small((k_pi / 4) * (b / a)) * a;
-    const Vec2 p = cos_sin_small((k_pi / 4) * (a / b)) * b;
-    return {p.y, p.x};
+    const bool flat = std::abs(a) > std::abs(b);
+    const float radius = flat ? a : b, other = flat ? b : a;
+    if (radius == 0) return {0, 0};
+    const Vec2 p = cos_sin_small((k_pi / 4) * (other / radius)) * radius;
+    return {flat ? p.x : p.y, flat ? p.y : p.x};
 }
 [[nodiscard]] constexpr float sample_disc_pdf() { return k_inv_pi; }
 

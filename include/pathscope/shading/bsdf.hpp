@@ -149,7 +149,7 @@ struct BsdfValue {
 /// not met this surface at all, else that light counts twice.
 [[nodiscard]] Rgb straight_transmission(const Bsdf& bsdf, Vec3 outgoing);
 
-/// Colour of the surface as seen along `outgoing`: its directional albedo from a table, good to about 0.01.
+/// Colour of the surface as seen along `outgoing`: its directional albedo from a table, good to about 0.02.
 /// For filter guides and albedo buffers. Delta kinds: the tint.
 [[nodiscard]] Rgb guide_albedo(const Bsdf& bsdf, Vec3 outgoing);
 

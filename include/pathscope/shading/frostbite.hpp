@@ -47,9 +47,15 @@ namespace pathscope {
 [[nodiscard]] BsdfValue eval_standard(const StandardSurface& surface, Vec3 outgoing, Vec3 incoming);
 
 /// Draws a reflection about a visible facet or a cosine-distributed direction, each as often as its lobe's
-/// share of the light reflected towards `outgoing`. May return z <= 0, where nothing is reflected.
+/// share of the light reflected towards `outgoing`; value and density as eval_standard gives them. Where the
+/// direction is below the surface, both are zero.
 /// Requires: outgoing.z > 0; u_lobe and u in [0, 1).
-[[nodiscard]] Vec3 sample_standard(const StandardSurface& surface, Vec3 outgoing, float u_lobe, Vec2 u);
+struct DirectionSample {
+    Vec3 incoming;
+    BsdfValue value;
+};
+[[nodiscard]] DirectionSample sample_standard(const StandardSurface& surface, Vec3 outgoing, float u_lobe,
+                                              Vec2 u);
 
 /// Directional albedo from the table; see guide_albedo().
 [[nodiscard]] Rgb standard_albedo(const StandardSurface& surface, Vec3 outgoing);

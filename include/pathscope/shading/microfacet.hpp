@@ -3,7 +3,7 @@
 ///
 ///   f = D(h) F V(wo, wi),   V = G / (4 cos_o cos_i),   h = (wo + wi) / |wo + wi|
 ///
-///   D(h) = 1 / (pi alpha^2 (h_x^2/alpha^2 + h_y^2/alpha^2 + h_z^2)^2)      density of facet normals
+///   D(h) = alpha^2 / (pi (h_x^2 + h_y^2 + alpha^2 h_z^2)^2)                density of facet normals
 ///   V    = 1 / (2 (cos_o t(wi) + cos_i t(wo))),  t(w) = |(alpha w_x, alpha w_y, w_z)|
 ///
 /// G is Smith's, correlated in height: facets that wo sees are high up, so wi likely sees them as well.
@@ -31,8 +31,7 @@ inline constexpr float k_min_alpha = 1e-3f;
 /// Facet normals per area and solid angle; the projected area, integral of D cos, is 1.
 [[nodiscard]] constexpr float ggx_distribution(Vec3 half, float alpha) {
     const float alpha2 = alpha * alpha;
-    const float stretched2 = (square(half.x) + square(half.y)) / alpha2 + square(half.z);
-    return k_inv_pi / (alpha2 * square(stretched2));
+    return k_inv_pi * alpha2 / square(square(half.x) + square(half.y) + alpha2 * square(half.z));
 }
 
 /// t(w): length of w after the stretch that turns the GGX surface into a hemisphere.
