@@ -156,14 +156,14 @@ void add_ivy(Model& model, const Placement& bay, std::uint32_t seed) {
             drift = 0.8f * drift + between(random, -0.05f, 0.05f);
             const float spread = p.y > k_lower_spring ? 1.6f : 0.4f;
             p.x += spread * drift;
-            p.y += 0.045f;
+            p.y += 0.06f;
             // It keeps to the wall's face, to the column below it, and to the string course above.
             const float wall = p.y < k_lower_spring ? 0.24f : p.y < k_upper_floor - 0.4f ? 0.27f : 0.44f;
             if (p.y < k_lower_spring) p.x += 0.3f * (-k_bay / 2 - p.x);
             p.z = wall + between(random, 0.0f, 0.05f);
             for (int leaf = 0; leaf < 2; ++leaf)
                 add_leaf(ivy, random, p + Vec3{between(random, -0.12f, 0.12f), 0, between(random, 0, 0.04f)},
-                         Vec3{0, 0.35f, 1} + 0.7f * random_direction(random), between(random, 0.09f, 0.19f));
+                         Vec3{0, 0.35f, 1} + 0.7f * random_direction(random), between(random, 0.10f, 0.21f));
         }
     }
     model.add(Stuff::ivy, ivy, bay);
@@ -202,14 +202,14 @@ void add_banner(Model& model, Stuff stuff, const Placement& column, float phase)
         const float narrow = 1 - 0.08f * down;
         return Vec3{(2 * u - 1) * k_half_width * narrow, k_top - k_length * down, 0.5f + fold};
     };
-    model.add(stuff, sheet(28, 40, {1, 1}, cloth), column);
+    model.add(stuff, sheet(24, 32, {1, 1}, cloth), column);
     model.add(Stuff::brass, box({-0.65f, k_top - 0.02f, 0.3f}, {0.65f, k_top + 0.02f, 0.52f}, 0.01f), column);
 }
 
 }  // namespace
 
 void furnish(Model& model) {
-    add_fountain(model, {0, 0, -2.5f});
+    add_fountain(model, {0, 0, -1});
     add_sphere_on_plinth(model, Stuff::mirror, {3.3f, 0, 7.0f}, 0.42f);
     add_sphere_on_plinth(model, Stuff::glass, {1.5f, 0, 8.2f}, 0.36f);
     add_vase(model, Stuff::glaze, {4.6f, 0, 8.6f}, 1.15f);

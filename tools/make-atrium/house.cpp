@@ -38,7 +38,7 @@ Shape corinthian_capital() {
                            {0.300f, 0.38f},
                            {0.300f, 0.41f},
                            {0, 0.41f}},
-                          32);
+                          28);
     for (int i = 0; i < 16; ++i) {
         const bool front = i % 2 == 0;
         append(capital, capital_leaf(front ? 0.205f : 0.212f, front ? 0.20f : 0.33f),
@@ -65,7 +65,7 @@ Shape lower_column() {
         const float t = float(i) / 6;
         profile.push_back({0.232f - 0.034f * std::pow(t, 1.8f), lerp(0.36f, 2.79f, t)});
     }
-    Shape column = lathe(profile, 32);
+    Shape column = lathe(profile, 28);
     append(column, box({-0.32f, 0, -0.32f}, {0.32f, 0.14f, 0.32f}, 0.012f));
     append(column, corinthian_capital(), {.origin = {0, 2.79f, 0}});
     append(column, box({-0.33f, 3.2f, -0.33f}, {0.33f, 3.3f, 0.33f}, 0.02f));
@@ -115,11 +115,9 @@ Shape baluster() {
                   {0.030f, 0.06f},
                   {0.060f, 0.20f},
                   {0.066f, 0.27f},
-                  {0.055f, 0.36f},
                   {0.028f, 0.50f},
                   {0.026f, 0.56f},
-                  {0.040f, 0.60f},
-                  {0.045f, 0.62f},
+                  {0.045f, 0.61f},
                   {0.045f, 0.66f}},
                  10);
 }
@@ -310,7 +308,7 @@ void add_roof(Model& model) {
     for (const Bay& bay : all_bays())
         for (int i = 0; i < 6; ++i)
             block(model, Stuff::oak, bay.place, {(float(i) - 2.5f) * k_bay / 6, k_cornice + 0.3f, 0.3f},
-                  {0.09f, 0.1f, 0.62f});
+                  {0.09f, 0.1f, 0.62f}, 0);
 }
 
 void add_garden(Model& model) {
