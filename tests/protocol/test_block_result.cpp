@@ -1,0 +1,98 @@
+#include "pathscope/protocol/block_result.hpp"
+
+#include "pathscope/core/hash.hpp"
+#include "pathscope/math/random.hpp"
+#include "pathscope/protocol/codec.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+
+namespace {
+
+std::vector<PixelSum> some_sums(std::size_t pixels) {
+    HashRng rng(1);
+    std::vector<PixelSum> sums(pixels);
+    for (PixelSum& sum : sums)
+        sum = {rng.next_u32() & 0xFFFFFF, rng.next_u32() & 0xFFFFFF, rng.next_u32() & 0xFFFFFF};
+    return sums;
+}
+
+message::Tile tile_of(const std::vector<PixelSum>& sums, Codec codec = Codec::shuffle_zstd) {
+    message::Tile tile;
+    tile.session = 1;
+    tile.lease = LeaseId{1};
+    tile.strategy = k_blocks_strategy;
+    tile.count = 4;
+    put_block_result(tile, sums, codec);
+    return tile;
+}
+
+std::string refusal(const message::Tile& tile, std::int64_t pixels) {
+    const auto sums = block_result(tile, pixels);
+    return sums ? std::string() : sums.error().message;
+}
+
+}  // namespace
+
+TEST_CASE("sums of a block come back, over the wire, with each codec") {
+    for (const std::size_t pixels : {0, 1, 32 * 32, 17 * 5})
+        for (const auto& codec : k_codec_names) {
+            const auto sums = some_sums(pixels);
+            Decoded arrived = decode(encode(tile_of(sums, codec.value)), Role::client, Channel::frames);
+            REQUIRE(bool(arrived));
+            const auto back = block_result(std::get<message::Tile>(*arrived), std::int64_t(pixels));
+            REQUIRE(bool(back));
+            CHECK(*back == sums);
+        }
+}
+
+TEST_CASE("the bytes before packing are the document's: red, green, blue, little-endian") {
+    const message::Tile tile = tile_of({{1, 2, 256}, {3, 0, 0}}, Codec::raw);
+    CHECK(tile.codec == "raw");
+    CHECK(tile.raw_bytes == 48);
+    std::string expected(48, '\0');
+    expected[0] = 1;
+    expected[8] = 2;
+    expected[17] = 1;
+    expected[24] = 3;
+    CHECK(tile.result == expected);
+    CHECK(tile.hash == hash_text(expected));
+}
+
+TEST_CASE("a tile whose codec, size, hash or range is wrong is refused with a sentence") {
+    const auto sums = some_sums(64);
+    const message::Tile good = tile_of(sums);
+    REQUIRE(good.codec == "shuffle-zstd");
+    REQUIRE(refusal(good, 64).empty());
+
+    message::Tile bad = good;
+    bad.codec = "zip";
+    CHECK(refusal(bad, 64) == "TILE: codec 'zip' is not known.");
+    CHECK(refusal(good, 63).find("'raw_bytes' is 1536, but 63 pixels have 1512") != std::string::npos);
+    bad = good;
+    bad.hash[0] ^= 1;
+    CHECK(refusal(bad, 64).find("'hash'") != std::string::npos);
+    bad = good;
+    bad.codec = "raw";
+    CHECK(refusal(bad, 64).find("payload has") != std::string::npos);
+
+    // A frame has a few bits without a meaning; what is accepted must be the sums themselves.
+    int refused = 0;
+    for (std::size_t i = 0; i < good.result.size(); ++i) {
+        bad = good;
+        bad.result[i] = static_cast<char>(bad.result[i] ^ 0x10);
+        if (const auto back = block_result(bad, 64))
+            CHECK(*back == sums);
+        else
+            ++refused;
+    }
+    CHECK(refused > int(good.result.size()) * 9 / 10);
+}
+
+TEST_CASE("sums that no samples can add up to are refused, so that adding cannot overflow") {
+    const std::int64_t most = 4 * k_max_quanta;
+    CHECK(refusal(tile_of({{most, most, most}}), 1).empty());
+    CHECK(refusal(tile_of({{most + 1, 0, 0}}), 1).find("beyond what 4 samples") != std::string::npos);
+    CHECK(refusal(tile_of({{0, -1, 0}}), 1).find("beyond what 4 samples") != std::string::npos);
+}
