@@ -8,7 +8,7 @@ namespace {
 constexpr TimeNs k_shortest = k_second_ns / 2;
 constexpr TimeNs k_longest_usual = 6 * k_second_ns;
 constexpr TimeNs k_longest = 3600 * k_second_ns;
-constexpr std::uint32_t k_most_doublings = 6;
+constexpr std::uint32_t k_most_doublings = 3;
 
 }  // namespace
 

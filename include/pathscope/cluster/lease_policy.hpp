@@ -1,12 +1,13 @@
 #pragma once
 /// How long a lease lasts, from how fast its server was so far.
 ///
-///     duration = clamp(4 * predicted, 0.5 s, max(6 s, 2 * predicted)) * 2^min(attempts, 6), at most an hour
+///     duration = clamp(4 * predicted, 0.5 s, max(6 s, 2 * predicted)) * 2^min(attempts, 3), at most an hour
 ///
 /// Why 4: rounds of one image differ in cost, and a lease that ends too early only makes work twice. Why at
 /// least half a second: a machine may stop a process for a moment. Why an upper end: a stuck server holds a
 /// round no longer than the classic system took to see a death. Why doubling: when every server is slower
-/// than predicted, each lease would end early for ever; the attempts before this one say so.
+/// than predicted, each lease would end early; the attempts before this one say so. Why not for long: a lease
+/// whose message was lost is waited for just as long.
 /// Thread safety: values.   Test: tests/cluster/test_lease_policy.cpp
 
 #include <cstdint>
