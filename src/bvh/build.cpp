@@ -62,21 +62,52 @@ std::size_t close_node(Builder& builder, const OpenNode& open, BvhNode& node) {
     return left;
 }
 
+/// The nodes of a tree while it grows; the first siblings are its root and the unused node.
+class Nodes {
+  public:
+    Nodes() : siblings_(1) {}
+
+    BvhNode& operator[](std::uint32_t number) { return siblings_[number / 2].nodes[number % 2]; }
+
+    /// Returns the number of the left one.
+    std::uint32_t append_siblings() {
+        siblings_.emplace_back();
+        return static_cast<std::uint32_t>(2 * (siblings_.size() - 1));
+    }
+
+    /// Puts a tree that was grown on its own in the place of a node.
+    void graft(std::uint32_t place, const Nodes& subtree) {
+        const auto shift = static_cast<std::uint32_t>(2 * (siblings_.size() - 1));
+        const auto moved = [shift](const BvhNode& node) {
+            return BvhNode{node.bounds, node.is_leaf() ? node.first : node.first + shift, node.count};
+        };
+        (*this)[place] = moved(subtree.siblings_[0].nodes[0]);
+        for (std::size_t i = 1; i < subtree.siblings_.size(); ++i) {
+            const auto& [left, right] = subtree.siblings_[i].nodes;
+            siblings_.push_back({moved(left), moved(right)});
+        }
+    }
+
+    std::vector<BvhSiblings> take() { return std::move(siblings_); }
+
+  private:
+    std::vector<BvhSiblings> siblings_;
+};
+
 struct OpenPair {
     OpenNode left, right;
 };
 
-/// Appends two children to `nodes` and makes them those of `parent`.
-OpenPair append_children(std::vector<BvhNode>& nodes, const OpenNode& parent, std::size_t left) {
-    const auto first = static_cast<std::uint32_t>(nodes.size());
+/// Makes two new nodes the children of `parent`.
+OpenPair append_children(Nodes& nodes, const OpenNode& parent, std::size_t left) {
+    const std::uint32_t first = nodes.append_siblings();
     nodes[parent.node].first = first;
-    nodes.resize(nodes.size() + 2);
     return {{first, parent.depth + 1, parent.begin, parent.begin + left},
             {first + 1, parent.depth + 1, parent.begin + left, parent.end}};
 }
 
 /// Down to the leaves, depth first.
-void grow(Builder& builder, std::vector<BvhNode>& nodes, const OpenNode& open) {
+void grow(Builder& builder, Nodes& nodes, const OpenNode& open) {
     const std::size_t left = close_node(builder, open, nodes[open.node]);
     if (left == 0) return;
     const OpenPair children = append_children(nodes, open, left);
@@ -85,7 +116,7 @@ void grow(Builder& builder, std::vector<BvhNode>& nodes, const OpenNode& open) {
 }
 
 /// Splits the top of the tree, level by level, until all ranges are small; returns those.
-std::vector<OpenNode> grow_top(Builder& builder, std::vector<BvhNode>& nodes, int threads) {
+std::vector<OpenNode> grow_top(Builder& builder, Nodes& nodes, int threads) {
     std::vector<OpenNode> small;
     std::vector<OpenNode> level{{0, 0, 0, builder.triangles.size()}};
     while (!level.empty()) {
@@ -107,17 +138,6 @@ std::vector<OpenNode> grow_top(Builder& builder, std::vector<BvhNode>& nodes, in
         level = std::move(next);
     }
     return small;
-}
-
-/// Puts a subtree, laid out as a tree of its own, below the node it was grown for.
-void graft(std::vector<BvhNode>& nodes, std::uint32_t at, const std::vector<BvhNode>& subtree) {
-    const auto shift =
-        static_cast<std::uint32_t>(nodes.size()) - 2;  // its root and the unused node stay behind
-    const auto moved = [shift](const BvhNode& node) {
-        return BvhNode{node.bounds, node.is_leaf() ? node.first : node.first + shift, node.count};
-    };
-    nodes[at] = moved(subtree[0]);
-    for (std::size_t i = 2; i < subtree.size(); ++i) nodes.push_back(moved(subtree[i]));
 }
 
 std::vector<BuildTriangle> gather(const Mesh& mesh) {
@@ -155,17 +175,14 @@ Bvh build_bvh(const Mesh& mesh, const BvhBuildParams& params, int threads) {
     if (builder.triangles.empty()) return {};
     CHECK(levels_of_halving(builder.triangles.size()) <= params.max_depth, builder.triangles.size());
 
-    Bvh bvh;
-    bvh.nodes.resize(2);
-    const std::vector<OpenNode> small = grow_top(builder, bvh.nodes, threads);
-    std::vector<std::vector<BvhNode>> subtrees(small.size());
+    Nodes nodes;
+    const std::vector<OpenNode> small = grow_top(builder, nodes, threads);
+    std::vector<Nodes> subtrees(small.size());
     parallel_for(static_cast<std::int64_t>(small.size()), threads, [&](int i) {
-        subtrees[i].resize(2);
         grow(builder, subtrees[i], {0, small[i].depth, small[i].begin, small[i].end});
     });
-    for (std::size_t i = 0; i < small.size(); ++i) graft(bvh.nodes, small[i].node, subtrees[i]);
-    bvh.triangles = copy_corners(mesh, builder.triangles, threads);
-    return bvh;
+    for (std::size_t i = 0; i < small.size(); ++i) nodes.graft(small[i].node, subtrees[i]);
+    return {nodes.take(), copy_corners(mesh, builder.triangles, threads)};
 }
 
 }  // namespace pathscope

@@ -3,8 +3,8 @@
 namespace pathscope {
 namespace {
 
-void add_subtree(BvhStats& stats, const Bvh& bvh, std::uint32_t index, int depth, double box_cost) {
-    const BvhNode& node = bvh.nodes[index];
+void add_subtree(BvhStats& stats, const Bvh& bvh, std::uint32_t number, int depth, double box_cost) {
+    const BvhNode& node = bvh.node(number);
     const double probability = node.box().half_area() / double(bvh.bounds().half_area());
     ++stats.nodes;
     stats.depth = std::max(stats.depth, depth);
@@ -22,8 +22,8 @@ void add_subtree(BvhStats& stats, const Bvh& bvh, std::uint32_t index, int depth
 BvhStats bvh_stats(const Bvh& bvh, const BvhBuildParams& params) {
     BvhStats stats;
     stats.triangles = static_cast<std::uint32_t>(bvh.triangles.size());
-    stats.bytes = bvh.nodes.size() * sizeof(BvhNode) + bvh.triangles.size() * sizeof(LeafTriangle);
-    if (!bvh.nodes.empty()) add_subtree(stats, bvh, 0, 0, params.box_cost);
+    stats.bytes = bvh.siblings.size() * sizeof(BvhSiblings) + bvh.triangles.size() * sizeof(LeafTriangle);
+    if (!bvh.empty()) add_subtree(stats, bvh, 0, 0, params.box_cost);
     return stats;
 }
 

@@ -31,29 +31,37 @@ namespace pathscope {
 
 inline constexpr float k_far_stretch = 1 + 0x1p-21f;
 
+/// Where the planes of one axis lie in BvhNode::bounds, as seen by the ray.
+struct SlabPlanes {
+    std::size_t near, far;
+};
+
 struct BoxRay {
     Vec3 near_origin, far_origin;
-    Vec3 inverse;                ///< 1 / direction, finite.
-    int near_x, near_y, near_z;  ///< 0 if the near plane is the low one, 3 if it is the high one.
+    Vec3 inverse;  ///< 1 / direction, finite.
+    SlabPlanes x, y, z;
 
     /// scene: encloses all boxes that will be tested.
-    BoxRay(const Ray& ray, const Box& scene) {
+    BoxRay(const Ray& ray, const Box& scene)
+        : x(planes(ray.direction, 0)), y(planes(ray.direction, 1)), z(planes(ray.direction, 2)) {
         const Vec3 reach = max(abs(scene.low - ray.origin), abs(scene.high - ray.origin));
         const float error = 0x1p-48f * max_component(reach);
-        const Vec3 shift = abs(ray.origin) * 0x1p-22f + Vec3{error, error, error};
         for (int axis = 0; axis < 3; ++axis) {
-            const bool backward = std::signbit(ray.direction[axis]);
+            const float shift =
+                std::copysign(std::abs(ray.origin[axis]) * 0x1p-22f + error, ray.direction[axis]);
+            near_origin[axis] = ray.origin[axis] + shift;
+            far_origin[axis] = ray.origin[axis] - shift;
             inverse[axis] = std::clamp(1 / ray.direction[axis], -k_largest, k_largest);
-            near_origin[axis] = ray.origin[axis] + (backward ? -shift[axis] : shift[axis]);
-            far_origin[axis] = ray.origin[axis] - (backward ? -shift[axis] : shift[axis]);
         }
-        near_x = std::signbit(ray.direction.x) ? 3 : 0;
-        near_y = std::signbit(ray.direction.y) ? 3 : 0;
-        near_z = std::signbit(ray.direction.z) ? 3 : 0;
     }
 
   private:
     static constexpr float k_largest = std::numeric_limits<float>::max();
+
+    static SlabPlanes planes(Vec3 direction, std::size_t axis) {
+        const bool backward = std::signbit(direction[static_cast<int>(axis)]);
+        return backward ? SlabPlanes{axis + 3, axis} : SlabPlanes{axis, axis + 3};
+    }
 };
 
 struct BoxInterval {
@@ -65,12 +73,12 @@ struct BoxInterval {
 /// bounds: low x, y, z, high x, y, z.
 [[nodiscard]] inline BoxInterval intersect_box(const BoxRay& ray, const std::array<float, 6>& bounds,
                                                float t_min, float t_max) {
-    const float near_x = (bounds[ray.near_x] - ray.near_origin.x) * ray.inverse.x;
-    const float near_y = (bounds[ray.near_y + 1] - ray.near_origin.y) * ray.inverse.y;
-    const float near_z = (bounds[ray.near_z + 2] - ray.near_origin.z) * ray.inverse.z;
-    const float far_x = (bounds[3 - ray.near_x] - ray.far_origin.x) * ray.inverse.x;
-    const float far_y = (bounds[4 - ray.near_y] - ray.far_origin.y) * ray.inverse.y;
-    const float far_z = (bounds[5 - ray.near_z] - ray.far_origin.z) * ray.inverse.z;
+    const float near_x = (bounds[ray.x.near] - ray.near_origin.x) * ray.inverse.x;
+    const float near_y = (bounds[ray.y.near] - ray.near_origin.y) * ray.inverse.y;
+    const float near_z = (bounds[ray.z.near] - ray.near_origin.z) * ray.inverse.z;
+    const float far_x = (bounds[ray.x.far] - ray.far_origin.x) * ray.inverse.x;
+    const float far_y = (bounds[ray.y.far] - ray.far_origin.y) * ray.inverse.y;
+    const float far_z = (bounds[ray.z.far] - ray.far_origin.z) * ray.inverse.z;
     return {std::max(std::max(near_x, near_y), std::max(near_z, t_min)),
             std::min(std::min(far_x, far_y), std::min(far_z, t_max)) * k_far_stretch};
 }

@@ -9,9 +9,9 @@
 ///
 /// It is evaluated between the bins into which the centroids are sorted, on all three axes, and the cheapest wins.
 ///
-/// Layout: nodes lie in one array, 32 bytes each, siblings side by side, so that one visit reads one cache line. Each
-/// leaf's triangles lie side by side too, copied with their corners (40 bytes), so that a leaf is read without a detour
-/// through the mesh. Node 0 is the root, node 1 is unused (it keeps siblings in one line).
+/// Layout: a node takes 32 bytes, and siblings lie side by side in one cache line, which one visit reads. Node 2i + j is
+/// nodes[j] of siblings[i]; node 0 is the root, node 1 is unused. The triangles of a leaf lie side by side
+/// too, copied with their corners (40 bytes each), so that a leaf is read without a detour through the mesh.
 ///
 /// Ensures: the same tree, byte for byte, for any number of threads. Depth at most k_bvh_max_depth, whatever the scene:
 /// where a chain of uneven splits would grow deeper, nodes are split into halves by count. Degenerate triangles are
@@ -38,7 +38,7 @@ inline constexpr int k_bvh_max_depth = 64;  ///< Of the deepest leaf, the root h
 
 struct alignas(32) BvhNode {
     std::array<float, 6> bounds{};  ///< low x, y, z, high x, y, z: an index of 0 or 3 picks the side.
-    std::uint32_t first = 0;  ///< Inner node: its children are `first` and `first + 1`. Leaf: first triangle.
+    std::uint32_t first = 0;  ///< Inner node: children are `first` and `first + 1`. Leaf: its first triangle.
     std::uint32_t count = 0;  ///< Triangles of a leaf; 0 for an inner node.
 
     [[nodiscard]] bool is_leaf() const { return count > 0; }
@@ -47,16 +47,24 @@ struct alignas(32) BvhNode {
     }
 };
 
+struct alignas(64) BvhSiblings {
+    std::array<BvhNode, 2> nodes;
+};
+
 struct LeafTriangle {
     Corner a, b, c;
     std::uint32_t triangle;  ///< Number in Mesh::triangles.
 };
 
 struct Bvh {
-    std::vector<BvhNode> nodes;           ///< Empty if nothing can be hit.
+    std::vector<BvhSiblings> siblings;    ///< Empty if nothing can be hit.
     std::vector<LeafTriangle> triangles;  ///< In the order of the leaves.
 
-    [[nodiscard]] Box bounds() const { return nodes.empty() ? Box{} : nodes[0].box(); }
+    [[nodiscard]] bool empty() const { return siblings.empty(); }
+    [[nodiscard]] const BvhNode& node(std::uint32_t number) const {
+        return siblings[number / 2].nodes[number % 2];
+    }
+    [[nodiscard]] Box bounds() const { return empty() ? Box{} : node(0).box(); }
 };
 
 enum class BvhSplit {

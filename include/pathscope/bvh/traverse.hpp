@@ -58,11 +58,10 @@ class TraversalStack {
 /// open_leaf may lower t_max, and ends the walk by returning true.
 template <class OpenLeaf, class Probe>
 void walk(const Bvh& bvh, const Ray& ray, const float& t_max, OpenLeaf&& open_leaf, Probe& probe) {
-    if (bvh.nodes.empty()) return;
+    if (bvh.empty()) return;
     const BoxRay box_ray(ray, bvh.bounds());
-    const BvhNode* nodes = bvh.nodes.data();
     const auto test_box = [&](std::uint32_t node) {
-        const BoxInterval interval = intersect_box(box_ray, nodes[node].bounds, ray.t_min, t_max);
+        const BoxInterval interval = intersect_box(box_ray, bvh.node(node).bounds, ray.t_min, t_max);
         probe.test_box(node, interval.t_near, interval.met());
         return interval;
     };
@@ -72,7 +71,7 @@ void walk(const Bvh& bvh, const Ray& ray, const float& t_max, OpenLeaf&& open_le
     std::uint32_t current = 0;
     for (;;) {
         probe.enter_node(current);
-        const BvhNode& node = nodes[current];
+        const BvhNode& node = bvh.node(current);
         if (!node.is_leaf()) {
             const BoxInterval left = test_box(node.first);
             const BoxInterval right = test_box(node.first + 1);
