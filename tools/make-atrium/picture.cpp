@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pathscope/core/parallel_for.hpp"
 #include "pathscope/math/random.hpp"
 
 namespace pathscope::atrium {
@@ -46,12 +47,12 @@ float ellipse(Vec2 p, Vec2 centre, float angle, float half_length, float half_wi
 }  // namespace
 
 Picture paint(int width, int height, const std::function<Rgb(Vec2)>& colour) {
-    Picture picture{width, height, {}};
-    picture.pixels.reserve(std::size_t(width) * height);
-    for (int y = 0; y < height; ++y)
+    Picture picture{width, height, std::vector<Rgb>(std::size_t(width) * height)};
+    parallel_for(height, 0, [&](int y) {
         for (int x = 0; x < width; ++x)
-            picture.pixels.push_back(
-                colour({(float(x) + 0.5f) / float(width), 1 - (float(y) + 0.5f) / float(height)}));
+            picture.pixels[std::size_t(y) * width + x] =
+                colour({(float(x) + 0.5f) / float(width), 1 - (float(y) + 0.5f) / float(height)});
+    });
     return picture;
 }
 
