@@ -46,8 +46,9 @@ Image filtered_by_equation(const Image& noisy, const Guides& guides, const Bilat
     for (int py = 0; py < noisy.height; ++py) {
         for (int px = 0; px < noisy.width; ++px) {
             double sum[3] = {}, weights = 0;
-            for (int qy = 0; qy < noisy.height; ++qy) {
-                for (int qx = 0; qx < noisy.width; ++qx) {
+            const int r = params.radius;
+            for (int qy = std::max(0, py - r); qy <= std::min(noisy.height - 1, py + r); ++qy) {
+                for (int qx = std::max(0, px - r); qx <= std::min(noisy.width - 1, px + r); ++qx) {
                     const double w = double(bilateral_weight(guides, params, px, py, qx, qy));
                     weights += w;
                     for (int c = 0; c < 3; ++c) sum[c] += w * double(noisy.at(qx, qy)[c]);
@@ -114,7 +115,11 @@ TEST_CASE("the fast loops give what the equation gives") {
         CHECK(largest_difference(filtered, noisy) > 0.1f);
     }
     params.radius = 3;
-    Guides no_guides;
+    const Image wide = random_image(300, 9, 13);  // Wider than what the loops take at once.
+    const Guides wide_guides = random_guides(300, 9, 14);
+    CHECK(largest_difference(joint_bilateral(wide, wide_guides, params),
+                             filtered_by_equation(wide, wide_guides, params)) < k_rounding);
+    const Guides no_guides;
     CHECK(largest_difference(joint_bilateral(noisy, no_guides, params),
                              filtered_by_equation(noisy, no_guides, params)) < k_rounding);
 }

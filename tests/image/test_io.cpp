@@ -67,6 +67,10 @@ void check_damage(const std::string& bytes, int trials) {
     }
 }
 
+void put_little_endian(std::string& bytes, std::size_t offset, std::uint32_t value) {
+    for (std::size_t i = 0; i < 4; ++i) bytes[offset + i] = static_cast<char>(value >> (8 * i));
+}
+
 void put_big_endian(std::string& bytes, std::size_t offset, std::uint32_t value) {
     for (std::size_t i = 0; i < 4; ++i) bytes[offset + i] = static_cast<char>(value >> (24 - 8 * i));
 }
@@ -104,6 +108,7 @@ TEST_CASE(".pfm by others: big endian, one channel, Windows line ends") {
         std::string("Pf\n1 2\n-1.0\n") + std::string("\x00\x00\x80\x3f\x00\x00\x00\x40", 8);
     CHECK(decode_hdr(grey, "x")->at(0, 0) == Rgb{2, 2, 2});
     CHECK(decode_hdr(grey, "x")->at(0, 1) == Rgb{1, 1, 1});
+    CHECK(contains(decode_hdr(grey + "?", "x").error().message, "holds 9 bytes of pixels where 1x2 need 8"));
 }
 
 TEST_CASE(".exr: layers and metadata come back under their names") {
@@ -240,6 +245,16 @@ TEST_CASE("files that claim to be huge are refused before memory is taken") {
     std::string png = saved_bytes(folder.path() / "a.png", Image(4, 4));
     put_big_endian(png, 16, 20000);  // The width in the IHDR chunk.
     CHECK(contains(decode_hdr(png, "x").error().message, "20000x4 pixels"));
+
+    std::string exr = saved_bytes(folder.path() / "a.exr", Image(4, 4));
+    const std::string attribute("dataWindow\0box2i\0", 17);
+    const std::size_t box = exr.find(attribute) + attribute.size() + 4;  // Past its size: x, y, x, y.
+    put_little_endian(exr, box + 8, 16383);
+    put_little_endian(exr, box + 12, 16383);
+    exr += std::string(20'000, '\0');  // Room for the table of rows, which is read first.
+    CHECK(contains(decode_hdr(exr, "x").error().message, "16384x16384 pixels"));
+    put_little_endian(exr, box + 8, 20000);
+    CHECK_FALSE(bool(decode_hdr(exr, "x")));
 }
 
 TEST_CASE("a .png that inflates to far more than its size says is stopped") {
