@@ -1,0 +1,67 @@
+#pragma once
+/// Closed rooms for tests of the whole estimator.
+
+#include "pathscope/integrator/path_estimator.hpp"
+#include "scene/small_scenes.hpp"
+
+namespace pathscope::testing {
+
+inline Material lambert(Rgb kd, Rgb ke = {}) {
+    Material material;
+    material.kind = MaterialKind::lambert;
+    material.kd = kd;
+    material.ke = ke;
+    return material;
+}
+
+/// All six sides of the box [low, high].
+inline void add_box(SceneParts& parts, Vec3 low, Vec3 high, std::uint32_t material) {
+    const Vec3 x{high.x - low.x, 0, 0}, y{0, high.y - low.y, 0}, z{0, 0, high.z - low.z};
+    add_rectangle(parts, low, y, x, material);
+    add_rectangle(parts, low + z, x, y, material);
+    add_rectangle(parts, low, z, y, material);
+    add_rectangle(parts, low + x, y, z, material);
+    add_rectangle(parts, low, x, z, material);
+    add_rectangle(parts, low + y, z, x, material);
+}
+
+/// A closed box of which every wall emits le and reflects rho: the radiance is le / (1 - rho) everywhere.
+inline Scene furnace(float le, float rho) {
+    SceneParts parts = empty_parts();
+    add_box(parts, {-1, -1, -1}, {1, 1, 1}, add_material(parts, lambert({rho, rho, rho}, {le, le, le})));
+    return small_scene(std::move(parts), {EmissiveMtlSpec{}});
+}
+
+/// A room with a glossy block, a mirror, a body of glass, a half-transparent pane, and a light below the ceiling.
+/// The light shines downwards only: upwards it would be near the ceiling, where 1/r^2 of the textbook's area sampling
+/// makes a variance that no z-test survives.
+inline Scene small_room() {
+    SceneParts parts = empty_parts();
+    add_box(parts, {-1, -1, -1}, {1, 1, 1}, add_material(parts, lambert({0.7f, 0.6f, 0.5f})));
+    Material glossy;
+    glossy.kd = {0.2f, 0.3f, 0.1f};
+    glossy.ks = {0.3f, 0.3f, 0.3f};
+    glossy.roughness = 0.5f;
+    add_box(parts, {-0.6f, -0.99f, -0.5f}, {0.0f, -0.2f, 0.1f}, add_material(parts, glossy));
+    Material mirror;
+    mirror.kind = MaterialKind::mirror;
+    mirror.ks = {0.9f, 0.9f, 0.9f};
+    add_rectangle(parts, {0.98f, -0.5f, -0.5f}, {0, 0, 1}, {0, 1, 0}, add_material(parts, mirror));
+    Material glass;
+    glass.kind = MaterialKind::dielectric;
+    add_box(parts, {0.2f, -0.9f, 0.1f}, {0.6f, -0.4f, 0.5f}, add_material(parts, glass));
+    Material veil = lambert({0.8f, 0.2f, 0.2f});
+    veil.opacity = 0.5f;
+    add_rectangle(parts, {-0.9f, -0.4f, 0.3f}, {0.6f, 0, 0}, {0, 0.6f, 0}, add_material(parts, veil));
+    add_rectangle(parts, {-0.4f, 0.98f, -0.4f}, {0.8f, 0, 0}, {0, 0, 0.8f},
+                  add_material(parts, lambert({0.5f, 0.5f, 0.5f}, {6, 5, 4})));
+    return small_scene(std::move(parts), {EmissiveMtlSpec{false}});
+}
+
+/// A ray of a small square picture of the room.
+inline Ray room_ray(int x, int y, int size, const PixelSampler& sampler) {
+    const CameraFrame camera = make_camera({{0, 0, 0.95f}, {0, -0.1f, 0}, {0, 1, 0}, 80}, size, size);
+    return camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension));
+}
+
+}  // namespace pathscope::testing
