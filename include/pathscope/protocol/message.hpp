@@ -17,6 +17,7 @@
 #include "pathscope/core/hash.hpp"
 #include "pathscope/core/ids.hpp"
 #include "pathscope/image/block.hpp"
+#include "pathscope/image/dropped_sample.hpp"
 
 namespace pathscope {
 
@@ -45,21 +46,6 @@ inline constexpr std::array k_nack_code_names{EnumName<NackCode>{NackCode::state
                                               EnumName<NackCode>{NackCode::draining, "draining"},
                                               EnumName<NackCode>{NackCode::failed, "failed"}};
 constexpr const auto& enum_table(NackCode) { return k_nack_code_names; }
-
-/// A sample that was dropped, by pixel of the whole image and sample number.
-struct DroppedSample {
-    std::uint32_t x = 0, y = 0, sample = 0;
-    bool operator==(const DroppedSample&) const = default;
-};
-inline constexpr std::size_t k_max_dropped_listed = 64;
-
-/// A file of a scene: its path relative to the scene's folder, and its content hash.
-struct ManifestEntry {
-    std::string name;
-    std::uint64_t size = 0;
-    Digest hash{};
-    bool operator==(const ManifestEntry&) const = default;
-};
 
 namespace message {
 
@@ -121,7 +107,7 @@ struct ManifestRequest {
 
 struct Manifest {
     Digest scene{};
-    std::string files;  ///< Payload: pack_manifest() (manifest.hpp); `scene` is its hash.
+    std::string files;  ///< Payload: section 5.2; `scene` is its hash.
     bool operator==(const Manifest&) const = default;
 };
 
