@@ -6,7 +6,7 @@
 ///     constexpr const auto& enum_table(Roulette) { return k_roulette_names; }
 ///
 /// name_of(Roulette::constant) == "constant"; from_name<Roulette>("constant") == Roulette::constant.
-/// Test: tests/core/test_enum_names.cpp walks a table both ways; each module walks its own with
+/// Test: tests/core/test_core.cpp walks a table both ways; each module walks its own with
 /// check_enum_table().
 
 #include <array>

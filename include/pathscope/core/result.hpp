@@ -10,7 +10,7 @@
 ///     use(*image);
 ///
 /// No exception leaves a module: libraries that throw are caught where they are called.
-/// Thread safety: as T.   Test: tests/core/test_result.cpp
+/// Thread safety: as T.   Test: tests/core/test_core.cpp
 
 #include <optional>
 #include <string>
