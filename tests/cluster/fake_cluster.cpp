@@ -36,6 +36,7 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
     s.duplicate = below(2) == 0 ? 0 : 0.3f * rng.next_float();
     s.refuse = below(3) == 0 ? 0.1f : 0;
     s.lie = below(3) == 0 ? 0.3f : 0;
+    s.careless = below(3) == 0 ? 0.1f : 0;
     s.faults_per_second = below(3) == 0 ? 0 : 2.0 * rng.next_float();
     s.local_fallback = below(2) == 0;
     s.new_images = static_cast<int>(below(3));
@@ -48,9 +49,9 @@ std::string ClusterSettings::describe() const {
     return fmt::format(
         "{} servers, {} units x {} samples in rounds of {}, {}, {}, drop {:.2f}, duplicate {:.2f}, refuse "
         "{:.2f}, "
-        "lie {:.2f}, {:.1f} faults/s, {} images, {} crashes{}{}",
+        "lie {:.2f}, careless {:.2f}, {:.1f} faults/s, {} images, {} crashes{}{}",
         servers, units, samples, round_samples, name_of(schedule), name_of(detector), drop, duplicate, refuse,
-        lie, faults_per_second, new_images + 1, crashes, local_fallback ? ", local fallback" : "",
+        lie, careless, faults_per_second, new_images + 1, crashes, local_fallback ? ", local fallback" : "",
         stop_at > 0 ? ", open-ended" : "");
 }
 
@@ -267,6 +268,7 @@ void FakeCluster::on_good_bye(ServerId id) {
 void FakeCluster::lose(ServerId id) {
     seats_.erase(id);
     ledger_.revoke(id, now_);
+    if (ledger_.outstanding(id) != 0) fail("a lost server still holds leases");
     tell_schedule();
 }
 
@@ -285,6 +287,8 @@ void FakeCluster::tick() {
         lose(id);
     }
     ledger_.expire(now_);
+    if (ledger_.next_deadline() && *ledger_.next_deadline() <= now_) fail("a lease outlived its deadline");
+    grant_carelessly();
     hand_out();
 }
 
@@ -310,6 +314,23 @@ void FakeCluster::hand_out_to(ServerId id, Seat& seat) {
         seat.credits.take(lease->id, lease->deadline + (lease->deadline - lease->granted));
         send([this, p = seat.process, lease = *lease, image = image_] { take(p, lease, image); });
     }
+}
+
+// A schedule may be wrong: the ledger must not believe it. What it does grant goes nowhere, and expires.
+void FakeCluster::grant_carelessly() {
+    if (!chance(settings_.careless) || seats_.empty()) return;
+    const LedgerPlan& plan = ledger_.plan();
+    const RoundKey round{rng_.next_u32() % plan.units,
+                         rng_.next_u32() % std::min(8u, plan.rounds_per_unit())};
+    const std::uint32_t first = round.index * plan.round_samples;
+    const std::vector<Lease> held = ledger_.outstanding_leases();
+    const bool is_held = std::any_of(held.begin(), held.end(), [&](const Lease& lease) {
+        return lease.unit == round.unit && lease.first == first;
+    });
+    const bool is_merged = merged_[round.unit].contains(first);
+    if (ledger_.grant(seats_.begin()->first, round, now_, k_second_ns) &&
+        (is_held || is_merged || ledger_.stopped()))
+        fail(fmt::format("granted round {} of unit {}, which is not open", round.index, round.unit));
 }
 
 // The client's own renderer: works while no server is ready.

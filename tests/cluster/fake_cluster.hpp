@@ -42,6 +42,7 @@ struct ClusterSettings {
     float duplicate = 0;  ///< Likewise.
     float refuse = 0;     ///< Of each lease: the server gives it back.
     float lie = 0;        ///< Of each result: a forged one comes along.
+    float careless = 0;   ///< Of each tick: the schedule proposes any round, open or not.
     double faults_per_second = 0;
     bool local_fallback =
         true;            ///< The client computes while no server is ready; else server process 0 is spared.
@@ -126,6 +127,7 @@ class FakeCluster {
     void tick();
     void hand_out();
     void hand_out_to(ServerId id, Seat& seat);
+    void grant_carelessly();
     void work_locally();
     void tell_schedule();
     void begin_image();
