@@ -44,6 +44,10 @@ float row_of(float roughness) { return std::sqrt(roughness) * (k_nodes - 1); }
 float cosine_of(int column) { return square(square(float(column) / (k_nodes - 1))); }
 float roughness_of(int row) { return square(float(row) / (k_nodes - 1)); }
 
+/// The node at or before x that has another after it. A NaN, as degenerate geometry makes them, gives node 0:
+/// what comes out is a NaN as well, but what is read is the table.
+int node_below(float x) { return int(std::min(std::max(0.0f, x), float(k_nodes - 2))); }
+
 struct Table {
     std::array<std::array<LobeAlbedos, k_nodes>, k_nodes> nodes;
 
@@ -63,7 +67,7 @@ LobeAlbedos mix(const LobeAlbedos& a, const LobeAlbedos& b, float t) {
 AlbedoRow::AlbedoRow(float roughness) {
     static const Table table;
     const float y = row_of(roughness);
-    const int row = std::min(int(y), k_nodes - 2);
+    const int row = node_below(y);
     low_ = table.nodes[row].data();
     high_ = table.nodes[row + 1].data();
     between_ = y - float(row);
@@ -71,7 +75,7 @@ AlbedoRow::AlbedoRow(float roughness) {
 
 LobeAlbedos AlbedoRow::at(float cosine) const {
     const float x = column_of(cosine);
-    const int column = std::min(int(x), k_nodes - 2);
+    const int column = node_below(x);
     return mix(mix(low_[column], high_[column], between_), mix(low_[column + 1], high_[column + 1], between_),
                x - float(column));
 }

@@ -13,7 +13,7 @@ constexpr bool k_is_delta = !std::is_same_v<Kind, Lambert> && !std::is_same_v<Ki
 // ---- Value and density, one overload for each kind.
 
 BsdfValue evaluate(const Lambert& surface, Vec3 outgoing, Vec3 incoming) {
-    if (outgoing.z <= 0 || incoming.z <= 0) return {};
+    if (!(outgoing.z > 0 && incoming.z > 0)) return {};
     return {surface.albedo * k_inv_pi, sample_cosine_hemisphere_pdf(incoming)};
 }
 
@@ -115,7 +115,7 @@ std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind
     if constexpr (k_is_delta<Kind>) {
         return sample_delta(surface, outgoing, u_lobe);
     } else {
-        if (outgoing.z <= 0) return std::nullopt;
+        if (!(outgoing.z > 0)) return std::nullopt;
         const DirectionSample drawn = sampling == HemisphereSampling::bsdf
                                           ? sample_lobes(surface, outgoing, u_lobe, u)
                                           : sample_hemisphere(sampling, surface, outgoing, u);

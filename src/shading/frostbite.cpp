@@ -77,7 +77,7 @@ BsdfValue evaluate(const View& view, Vec3 incoming) {
 }  // namespace
 
 BsdfValue eval_standard(const StandardSurface& surface, Vec3 outgoing, Vec3 incoming) {
-    if (outgoing.z <= 0 || incoming.z <= 0) return {};
+    if (!(outgoing.z > 0 && incoming.z > 0)) return {};  // a NaN is not reflected either
     return evaluate(View(surface, outgoing), incoming);
 }
 
@@ -85,7 +85,7 @@ DirectionSample sample_standard(const StandardSurface& surface, Vec3 outgoing, f
     const View view(surface, outgoing);
     const Vec3 incoming = u_lobe < view.specular_probability ? sample_ggx_reflection(outgoing, view.alpha, u)
                                                              : sample_cosine_hemisphere(u);
-    if (incoming.z <= 0) return {incoming, {}};
+    if (!(incoming.z > 0)) return {incoming, {}};
     return {incoming, evaluate(view, incoming)};
 }
 

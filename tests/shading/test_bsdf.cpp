@@ -1,5 +1,7 @@
 #include "pathscope/shading/bsdf.hpp"
 
+#include <limits>
+
 #include "pathscope/shading/fresnel.hpp"
 #include "statistics.hpp"
 #include "surfaces.hpp"
@@ -281,6 +283,26 @@ TEST_CASE("opacity: the ray passes straight through with the rest of the probabi
     // Closed and open ends.
     CHECK_FALSE(sample_bsdf({Lambert{{1, 1, 1}}, 1}, {0, 0, 1}, k_one_minus_epsilon, {0.5f, 0.5f})->straight);
     CHECK(sample_bsdf({Lambert{{1, 1, 1}}, 0}, {0, 0, 1}, 0, {0.5f, 0.5f})->straight);
+}
+
+TEST_CASE("NaN directions and materials, as broken scenes make them, are survived") {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    std::vector<Bsdf> surfaces = smooth_surfaces();
+    for (const Bsdf& bsdf : delta_surfaces()) surfaces.push_back(bsdf);
+    surfaces.push_back(standard({nan, 1, 1}, {nan, 0, 0}, nan));
+    surfaces.push_back(standard({1, 1, 1}, {0.5f, 0.5f, 0.5f}, -3));
+    surfaces.push_back(standard({1, 1, 1}, {0.5f, 0.5f, 0.5f}, 1e9f));
+    const Vec3 broken{nan, nan, nan}, up{0, 0, 1};
+    for (const Bsdf& bsdf : surfaces) {
+        CHECK(is_zero(eval_bsdf(bsdf, broken, up)));
+        CHECK(is_zero(eval_bsdf(bsdf, up, broken)));
+        (void)eval_bsdf(bsdf, up, up);
+        (void)guide_albedo(bsdf, broken);
+        for (const HemisphereSampling lever : k_levers) {
+            (void)sample_direction(lever, bsdf, broken, 0.5f, {0.5f, 0.5f});
+            (void)sample_direction(lever, bsdf, up, 0.5f, {0.5f, 0.5f});
+        }
+    }
 }
 
 TEST_CASE("black surfaces end the path") {
