@@ -4,6 +4,7 @@
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 #include <utility>
 
@@ -42,13 +43,14 @@ struct Collector {
 
     std::uint32_t material() {
         if (std::exchange(material_is_new, false)) {
-            const auto known = std::find(material_names.begin(), material_names.end(), current_material);
-            current_ = std::uint32_t(known - material_names.begin());
-            if (known == material_names.end()) material_names.push_back(current_material);
+            const auto [entry, is_new] = numbers_.try_emplace(current_material, material_names.size());
+            if (is_new) material_names.push_back(current_material);
+            current_ = std::uint32_t(entry->second);
         }
         return current_;
     }
 
+    std::map<std::string, std::size_t> numbers_;
     std::uint32_t current_ = 0;
 };
 

@@ -363,7 +363,7 @@ std::string to_json(const SceneFile& scene) {
     for (const auto& [name, material] : scene.materials) out["materials"][name] = written(material);
     if (scene.defaults != RenderDefaults{}) out["defaults"] = written(scene.defaults);
     if (scene.preview) out["preview"] = written(*scene.preview);
-    return out.dump();
+    return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 const CameraSpec* find_camera(const SceneFile& scene, std::string_view name) {

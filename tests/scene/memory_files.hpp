@@ -11,7 +11,7 @@ namespace pathscope::testing {
 class MemoryFiles final : public FileSource {
   public:
     MemoryFiles() = default;
-    MemoryFiles(std::initializer_list<std::pair<const std::string, std::string>> files) : files(files) {}
+    MemoryFiles(std::initializer_list<std::pair<const std::string, std::string>> list) : files(list) {}
 
     Result<std::optional<std::string>> find(std::string_view name) override {
         const auto file = files.find(name);
