@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -59,7 +59,7 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
         ::waitpid(pid, nullptr, 0);
         return refuse(exec_error);
     }
-    return ChildProcess(pid, ::pidfd_open(pid, 0));
+    return ChildProcess(pid, int(::syscall(SYS_pidfd_open, pid, 0)));
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pathscope/core/log.hpp"
+#include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
 #include "pathscope/protocol/block_result.hpp"
 #include "pathscope/session/build_identity.hpp"
@@ -239,7 +240,7 @@ void ClientSession::receive_one(const std::string& instance, Frames frames, Chan
     if (store_.keeps_events())
         store_.record({monotonic_now(), 0, k_local_server, 0,
                        MessageEvent{MessageWay::received, name_of(type_of(*decoded)), name_of(channel), id,
-                                    bytes, to_text(*decoded)}});
+                                    bytes, LongText(to_text(*decoded))}});
     if (const auto* hello = std::get_if<message::Hello>(&*decoded)) return on_hello(instance, *hello);
     if (!server) {
         count_dropped(id, "It comes from a server that did not say HELLO.", channel);
@@ -293,7 +294,7 @@ void ClientSession::send(Channel channel, const std::string& instance, Message m
         store_.record(
             {monotonic_now(), 0, k_local_server, 0,
              MessageEvent{left ? MessageWay::sent : MessageWay::dropped, name_of(type), name_of(channel),
-                          peer, bytes, left ? text : "The peer is not connected, or does not keep up."}});
+                          peer, bytes, LongText(left ? text : "The peer is not connected, or does not keep up.")}});
 }
 
 // ---- Joining.
@@ -462,7 +463,7 @@ void ClientSession::step_peer(Server& server, PeerCause cause, std::string_view 
              StateEvent{"peer", server.peer.id(), name_of(before), name_of(server.peer.state()), detail}});
 }
 
-/// A server is gone; what it owed is open again. By value: the entry goes away.
+/// A server is gone; what it owed is open again. Its entry, and so `instance` if it is the entry's, ends here.
 void ClientSession::lose(const std::string& instance, PeerCause cause, std::string_view why) {
     const auto found = servers_.find(instance);
     if (found == servers_.end()) return;

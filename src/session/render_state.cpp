@@ -198,9 +198,9 @@ Result<RenderState> decode_state(const PackMap& map) {
 Digest state_hash(const RenderState& state) { return hash_text(pack(encode_state(state))); }
 
 PackMap state_changes(const RenderState& before, const RenderState& after) {
-    const PackMap old_map = encode_state(before);
+    const PackMap old_map = encode_state(before), new_map = encode_state(after);
     PackMap changes;
-    for (const auto& [key, value] : encode_state(after).entries())
+    for (const auto& [key, value] : new_map.entries())
         if (const PackValue* old_value = old_map.find(key); !old_value || *old_value != value)
             changes.set(key, value);
     return changes;

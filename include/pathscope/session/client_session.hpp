@@ -93,9 +93,9 @@ class ClientSession {
         std::uint32_t pid = 0;
         Peer peer;
         FailureDetector detector;
-        ClockEstimate clock;
+        ClockEstimate clock{};
         Credits credits{0};
-        SpeedEstimate speed;
+        SpeedEstimate speed{};
         TimeNs next_ping = 0;
     };
     struct LocalServer {
