@@ -22,10 +22,10 @@ void for_each_channel(const Image& a, const Image& b, Term&& term) {
 
 double square(double x) { return x * x; }
 
-/// Means over the whole blocks of a picture, channel by channel.
+/// Means over the whole blocks of a picture, channel by channel, counted from the left and the bottom.
 std::vector<double> block_means(const Image& image, int size) {
     std::vector<double> means;
-    for (int y = 0; y + size <= image.height; y += size) {
+    for (int y = image.height % size; y < image.height; y += size) {
         for (int x = 0; x + size <= image.width; x += size) {
             double sum[3] = {};
             for (int dy = 0; dy < size; ++dy)

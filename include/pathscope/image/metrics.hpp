@@ -27,7 +27,8 @@ struct RelMseParams {
 };
 [[nodiscard]] double rel_mse(const Image& image, const Image& reference, const RelMseParams& params = {});
 
-/// Comparison with an independent renderer's image. Rows and columns that fill no whole block are left out.
+/// Comparison with an independent renderer's image. Blocks count from the lower left corner, where a .pfm starts; the
+/// columns on the right and rows at the top that fill no whole block are left out.
 struct BlockComparison {
     double median = 0;  ///< Over blocks and channels.
     double percentile_95 = 0;
