@@ -26,8 +26,9 @@ std::array<float, 256> make_decode_table() {
     return table;
 }
 
-/// Encoding to 8 bits without pow(): thresholds between neighbouring codes, and a first guess from the leading bits
-/// of the float. Buckets are so narrow (64 per octave) that the guess is at most two codes too low.
+/// Encoding to 8 bits without pow() and without branches: thresholds between neighbouring codes, and a guess from the
+/// leading bits of the float. Buckets of bits are so narrow (128 per octave) that none holds two thresholds, so the
+/// guess is right or one too low.
 class Encoder8 {
   public:
     Encoder8() {
@@ -47,16 +48,15 @@ class Encoder8 {
     }
 
     std::uint8_t operator()(float linear) const {
-        if (!(linear > k_smallest)) return 0;  // NaN too.
-        if (linear >= 1) return 255;
-        std::size_t code = guesses_[(std::bit_cast<std::uint32_t>(linear) >> k_shift) - k_first_bucket];
-        while (linear >= thresholds_[code + 1]) ++code;
-        return std::uint8_t(code);
+        const float not_small = linear > k_smallest ? linear : k_smallest;  // NaN is not greater.
+        const float x = std::min(not_small, k_one_minus_epsilon);
+        const std::size_t guess = guesses_[(std::bit_cast<std::uint32_t>(x) >> k_shift) - k_first_bucket];
+        return std::uint8_t(guess + (x >= thresholds_[guess + 1]));
     }
 
   private:
-    static constexpr float k_smallest = 0x1p-13f;  // Encodes to 0.4 of code 1.
-    static constexpr int k_shift = 17;             // Leaves the exponent and 6 bits of the fraction.
+    static constexpr float k_smallest = 0x1p-13f;  // Encodes to 0.4 of code 1; all below is black too.
+    static constexpr int k_shift = 16;             // Leaves the exponent and 7 bits of the fraction.
     static constexpr std::uint32_t k_first_bucket = std::bit_cast<std::uint32_t>(k_smallest) >> k_shift;
     static constexpr std::size_t k_buckets = (std::bit_cast<std::uint32_t>(1.0f) >> k_shift) - k_first_bucket;
 
