@@ -4,6 +4,7 @@
 
 #include <cerrno>
 
+#include "context_state.hpp"
 #include "pathscope/core/check.hpp"
 
 namespace pathscope {
@@ -13,10 +14,13 @@ Context::Context(const ContextOptions& options) {
     CHECK(context != nullptr, zmq_strerror(errno));
     CHECK(zmq_ctx_set(context, ZMQ_IO_THREADS, options.io_threads) == 0, options.io_threads);
     CHECK(zmq_ctx_set(context, ZMQ_MAX_SOCKETS, options.max_sockets) == 0, options.max_sockets);
-    handle_ = std::shared_ptr<void>(context, [](void* last) {
-        while (zmq_ctx_term(last) != 0 && errno == EINTR) {
-        }
-    });
+    state_ = std::make_shared<ContextState>(context);
+}
+
+ContextState::~ContextState() {
+    doorkeeper.reset();
+    while (zmq_ctx_term(zmq) != 0 && errno == EINTR) {
+    }
 }
 
 }  // namespace pathscope

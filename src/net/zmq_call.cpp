@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 
+#include "context_state.hpp"
 #include "pathscope/core/check.hpp"
 
 namespace pathscope {
@@ -86,6 +87,24 @@ bool has_possible_port(std::string_view endpoint) {
     return error == std::errc() && end == port.data() + port.size() && number >= 0 && number <= 65535;
 }
 
+struct SetSecurity {
+    void* socket;
+
+    void operator()(std::monostate) const {}
+    void operator()(const Listener& listener) const {
+        CHECK(is_key(listener.keys.secret_key));
+        set_option(socket, ZMQ_CURVE_SERVER, 1);
+        set_option(socket, ZMQ_CURVE_SECRETKEY, listener.keys.secret_key);
+    }
+    void operator()(const Dialler& dialler) const {
+        CHECK(is_key(dialler.keys.secret_key) && is_key(dialler.keys.public_key));
+        CHECK(is_key(dialler.listener_public_key));
+        set_option(socket, ZMQ_CURVE_SERVERKEY, dialler.listener_public_key);
+        set_option(socket, ZMQ_CURVE_PUBLICKEY, dialler.keys.public_key);
+        set_option(socket, ZMQ_CURVE_SECRETKEY, dialler.keys.secret_key);
+    }
+};
+
 std::string what_to_do(int error) {
     switch (error) {
         case EADDRINUSE:
@@ -114,9 +133,11 @@ void set_option(void* socket, int option, std::string_view value) {
 }
 
 Result<SocketHandle> open_socket(const Context& context, int type, const SocketOptions& options) {
-    void* socket = zmq_socket(context.handle().get(), type);
+    if (std::holds_alternative<Listener>(options.security) && !context.state()->doorkeeper)
+        return failed("Cannot listen with keys before it is said which keys are admitted.");
+    void* socket = zmq_socket(context.state()->zmq, type);
     if (!socket) return failed(fmt::format("Cannot open a socket: {}.", zmq_strerror(errno)));
-    SocketHandle handle(context.handle(), socket);
+    SocketHandle handle(context.state(), socket);
 
     const std::int64_t max_frame_bytes = options.max_frame_bytes;
     CHECK(zmq_setsockopt(socket, ZMQ_MAXMSGSIZE, &max_frame_bytes, sizeof max_frame_bytes) == 0);
@@ -129,6 +150,7 @@ Result<SocketHandle> open_socket(const Context& context, int type, const SocketO
     set_option(socket, ZMQ_TCP_KEEPALIVE, 1);
     set_option(socket, ZMQ_HEARTBEAT_IVL, options.transport_heartbeat_ms);
     set_option(socket, ZMQ_HEARTBEAT_TIMEOUT, 5 * options.transport_heartbeat_ms);
+    std::visit(SetSecurity{socket}, options.security);
     return handle;
 }
 

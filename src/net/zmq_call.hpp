@@ -34,6 +34,6 @@ void set_option(void* socket, int option, std::string_view value);
 /// The next message that is waiting; of one with more than k_max_frames, only the first ones are kept.
 [[nodiscard]] std::optional<Frames> receive_frames(void* socket);
 
-inline constexpr std::size_t k_max_frames = 8;
+inline constexpr std::size_t k_max_frames = 16;  ///< More than any message of ours or of ZeroMQ's has.
 
 }  // namespace pathscope

@@ -209,7 +209,7 @@ TEST_CASE("messages of more frames than any of ours are cut, not kept") {
     REQUIRE(dealer->send({"next"}) == SendOutcome::delivered);
     const auto cut = receive_soon(*router);
     REQUIRE(cut.has_value());
-    CHECK(cut->frames.size() < 10);
+    CHECK(cut->frames.size() < 20);
     CHECK(cut->frames.size() > 3);
     CHECK(receive_soon(*router)->frames == Frames{"next"});
 }

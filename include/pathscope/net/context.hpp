@@ -15,15 +15,17 @@ struct ContextOptions {
         4096;  ///< Sockets in this process, of inproc peers too; TCP peers of one socket do not count.
 };
 
+class ContextState;  // Of this module alone.
+
 class Context {
   public:
     explicit Context(const ContextOptions& options = {});
 
-    /// Only for sockets of this module: the ZeroMQ handle.
-    [[nodiscard]] const std::shared_ptr<void>& handle() const { return handle_; }
+    /// Only for this module.
+    [[nodiscard]] const std::shared_ptr<ContextState>& state() const { return state_; }
 
   private:
-    std::shared_ptr<void> handle_;
+    std::shared_ptr<ContextState> state_;
 };
 
 }  // namespace pathscope

@@ -17,6 +17,7 @@
 #include "pathscope/core/frames.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/net/context.hpp"
+#include "pathscope/net/security.hpp"
 
 namespace pathscope {
 
@@ -32,6 +33,7 @@ struct SocketOptions {
     int reconnect_max_ms = 5000;  ///< ...up to this.
     int transport_heartbeat_ms = 1000;  ///< ZMTP ping on a silent connection; five unanswered ones close it.
     int backlog = 4096;  ///< Connections waiting to be accepted: servers may join by the hundred.
+    Security security;   ///< Keys (security.hpp); none by default.
 };
 
 enum class SendOutcome {
@@ -51,17 +53,16 @@ struct Pollable {
 class SocketHandle {
   public:
     SocketHandle() = default;
-    SocketHandle(std::shared_ptr<void> context, void* socket)
+    SocketHandle(std::shared_ptr<ContextState> context, void* socket)
         : context_(std::move(context)), socket_(socket) {}
     SocketHandle(SocketHandle&& other) noexcept;
     SocketHandle& operator=(SocketHandle&& other) noexcept;
     ~SocketHandle();
 
     [[nodiscard]] void* get() const { return socket_; }
-    [[nodiscard]] const std::shared_ptr<void>& context() const { return context_; }
 
   private:
-    std::shared_ptr<void> context_;
+    std::shared_ptr<ContextState> context_;
     void* socket_ = nullptr;
 };
 

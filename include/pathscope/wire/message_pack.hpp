@@ -64,13 +64,11 @@ class PackValue {
     PackValue() = default;           ///< nil
     template <std::same_as<bool> T>  // A template, because any pointer converts to a plain bool.
     PackValue(T value) : value_(value) {}
-    template <std::integral T>
-    requires(!std::same_as<T, bool>) PackValue(T value) {
-        if (std::cmp_less(value, 0))
-            value_ = static_cast<std::int64_t>(value);
-        else
-            value_ = static_cast<std::uint64_t>(value);
-    }
+    template <std::unsigned_integral T>
+    requires(!std::same_as<T, bool>) PackValue(T value) : value_(std::uint64_t{value}) {}
+    template <std::signed_integral T>
+    PackValue(T value)
+        : value_(value < 0 ? Variant(std::int64_t{value}) : Variant(static_cast<std::uint64_t>(value))) {}
     PackValue(double value) : value_(value) {}
     PackValue(std::string text) : value_(std::move(text)) {}
     PackValue(std::string_view text) : value_(std::string(text)) {}
