@@ -14,12 +14,14 @@ using namespace pathscope;
 
 namespace {
 
+constexpr std::uint32_t k_rounds = 16;  ///< Of each unit.
+
 /// A full-HD image in blocks of 32x32, for 1,000 servers with two leases each, answered in random order: what the
 /// client does for every tile apart from sockets and pixels. One in a hundred leases is given back.
 double tiles_per_second(ScheduleKind kind, EventStore* store) {
     constexpr std::uint32_t k_servers = 1000;
     Ledger ledger(store);
-    ledger.new_epoch({Epoch{1}, 60 * 34, 32, 1}, 0);
+    ledger.new_epoch({Epoch{1}, 60 * 34, k_rounds, 1}, 0);
     Schedule schedule(kind, make_unit_order(UnitOrder::spiral, 60, 34));
     std::vector<ServerShare> servers;
     for (std::uint32_t i = 1; i <= k_servers; ++i) servers.push_back({ServerId{i}, double(i % 7 + 1)});
@@ -48,7 +50,7 @@ double tiles_per_second(ScheduleKind kind, EventStore* store) {
     }
     const double seconds = double(std::clock() - begin) / CLOCKS_PER_SEC;
     CHECK(ledger.complete());
-    CHECK(ledger.rounds_committed() == 60 * 34 * 32);
+    CHECK(ledger.rounds_committed() == 60 * 34 * k_rounds);
     return double(ledger.rounds_committed()) / seconds;
 }
 
@@ -63,6 +65,6 @@ TEST_CASE(
         const double recorded = tiles_per_second(kind, &full);
         MESSAGE(fmt::format("{:>8}: {:.0f} tiles/s without a store, {:.0f} with counters, {:.0f} with events",
                             name, bare, counted, recorded));
-        CHECK(counters.total(Counter::tiles) == 60 * 34 * 32);
+        CHECK(counters.total(Counter::tiles) == 60 * 34 * k_rounds);
     }
 }
