@@ -7,8 +7,8 @@
 namespace pathscope {
 namespace {
 
-/// atan(t) in radians for t in [0, 1]: the nearest of 0, π/8, π/4 is taken off by the addition theorem, so that
-/// the series runs over |x| <= tan(π/16) < 0.2 only. Error below 2e-7.
+/// atan(t) in radians for t in [0, 1]: the nearest of 0, π/8, π/4 is taken off by the addition theorem, so
+/// that the series runs over |x| <= tan(π/16) < 0.2 only. Error below 2e-7.
 float arc_tangent(float t) {
     constexpr float k_tan_1_16 = 0.19891237f, k_tan_2_16 = 0.41421356f, k_tan_3_16 = 0.66817864f;  // of π
     float base = 0, x = t;
@@ -42,7 +42,7 @@ Rgb bilinear(const Image& image, Vec2 uv) {
     return lerp(lerp(row0[x0], row0[x1], x - left), lerp(row1[x0], row1[x1], x - left), y - top);
 }
 
-/// The mean of the bilinear picture over one texel: over each axis an eighth of the neighbours, 3/4 of the texel.
+/// The mean of the bilinear picture over one texel: by axis, 1/8 of each neighbour and 3/4 of the texel.
 Rgb mean_over_texel(const Image& image, int x, int y) {
     constexpr float k_weights[3] = {0.125f, 0.75f, 0.125f};
     Rgb sum;

@@ -12,7 +12,6 @@ struct Request {
     const Scene& scene;
     LightSampling sampling;
     const LightReference& reference;
-    std::uint32_t light;
     float pick_probability;
     Vec2 u;
 };
@@ -40,7 +39,7 @@ std::optional<LightSample> unless_dark(const LightSample& sample) {
     return sample;
 }
 
-// ---- Surfaces ------------------------------------------------------------------------------------------------
+// ---- Surfaces.
 
 float triangle_pdf(const Connection& to_light, const TriangleLight& light, Vec3 normal) {
     return to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
@@ -129,7 +128,7 @@ float sphere_pdf(LightSampling sampling, const LightReference& reference, const 
     return cone ? sample_cone_pdf(cone->one_minus_cos) : 0;
 }
 
-// ---- Deltas --------------------------------------------------------------------------------------------------
+// ---- Deltas.
 
 std::optional<LightSample> sample(const Request& request, const PointLight& light) {
     const Connection to_light(request.reference, light.position);
@@ -153,7 +152,7 @@ std::optional<LightSample> sample_delta_sun(const Request& request, const SunLig
     return unless_dark(sample);
 }
 
-// ---- Infinity ------------------------------------------------------------------------------------------------
+// ---- Infinity.
 
 /// A direction drawn from one of the lights at infinity, with the radiance and the density of all of them.
 std::optional<LightSample> complete(const Request& request, Vec3 direction) {
@@ -195,7 +194,7 @@ std::optional<LightSample> sample_light(const Scene& scene, LightSampling sampli
     if (scene.lights.empty()) return std::nullopt;
     const auto pick = scene.lights.pick[std::size_t(sampling)].sample(u_pick);
     const auto light = std::uint32_t(pick.index);
-    const Request request{scene, sampling, reference, light, pick.pmf, u};
+    const Request request{scene, sampling, reference, pick.pmf, u};
     auto result =
         std::visit([&](const auto& kind) { return sample(request, kind); }, scene.lights.lights[light]);
     if (result) result->light = light;

@@ -16,7 +16,7 @@ namespace {
 /// Squares of distances and areas must stay finite in floats.
 constexpr float k_largest_coordinate = 1e15f;
 
-// ---- Surfaces of the scene file's lights ---------------------------------------------------------------------
+// ---- Surfaces of the scene file's lights.
 
 std::uint32_t add_black_emitter(Scene& scene, const char* name, Rgb radiance) {
     Material material;
@@ -70,10 +70,10 @@ Result<void> check_size(const Scene& scene) {
                     farthest, k_largest_coordinate));
 }
 
-// ---- The table of lights -------------------------------------------------------------------------------------
+// ---- The table of lights.
 
-/// Mean emission of a triangle for its power: over 16 points, or as it is without maps. At least a hundredth of
-/// what its material can emit, so that a bright spot between the points is found too.
+/// Mean emission of a triangle for its power: over 16 points, or as it is without maps. At least a hundredth
+/// of what its material can emit, so that a bright spot between the points is found too.
 Rgb mean_radiance(const Scene& scene, std::uint32_t triangle) {
     const Material& material = scene.materials[scene.mesh.material_of(triangle)];
     if (!material.map_ke && !material.map_d) return material.ke;
@@ -155,7 +155,7 @@ struct AddLight {
     }
 };
 
-// ---- How bright it is ----------------------------------------------------------------------------------------
+// ---- How bright it is.
 
 struct Brightness {
     Rgb typical, brightest;

@@ -37,8 +37,8 @@ Vec3 bend_normal(Vec3 shading, Vec3 geometric, Vec3 outgoing) {
     const Vec3 n = shading * side, surface = geometric * side;
     const Vec3 mirrored = reflect(outgoing, n);
 
-    // How far above the triangle the mirror direction must stay. On a flat triangle it is as far above as `outgoing`,
-    // and is never bent.
+    // How far above the triangle the mirror direction must stay. On a flat triangle it is as far above as
+    // `outgoing`, and is never bent.
     const float height = dot(outgoing, surface);
     const float least = std::min(0.01f, 0.5f * height);
     const float below = least - dot(mirrored, surface);

@@ -71,7 +71,7 @@ TEST_CASE("the centre of the picture lies towards -z, its right towards +x, its 
 }
 
 TEST_CASE("where z is up the centre lies towards +y, and turning is counter-clockwise from above") {
-    // Texel (1, 1) of 4 x 3 has its centre at u = 3/8, v = 1/2: an eighth of a turn to the left of the centre.
+    // Texel (1, 1) of 4 x 3 has its centre at u = 3/8, v = 1/2: an eighth of a turn left of the middle.
     const float h = std::sqrt(0.5f);
     const auto red = [](const EnvironmentMap& map, Vec3 direction) {
         return environment_map_radiance(map, direction).x;
@@ -104,8 +104,8 @@ TEST_CASE("radiance is bilinear, runs around the seam and is held at the poles")
 }
 
 TEST_CASE("directions follow their density, also where most of the picture is black") {
-    // The rows of three end at z = 1/2 and -1/2, and columns at eighths: at borders of the test's cells, so that the
-    // density has no jump within one.
+    // The rows of three end at z = 1/2 and -1/2, and columns at eighths: at borders of the test's cells, so
+    // that the density has no jump within one.
     for (const float rotate : {0.0f, 45.0f}) {
         const EnvironmentMap map = make_map(spotted_picture(3), rotate, UpAxis::z);
         HashRng rng(5);

@@ -54,8 +54,8 @@ void check_irradiance(const Scene& scene, const SurfacePoint& at, double expecte
     }
 }
 
-/// Fraction of a hemisphere's cosine-weighted light that a rectangle of a x b fills, seen from a point at distance h
-/// below one of its corners and facing it (Howell, configuration B-4).
+/// Fraction of a hemisphere's cosine-weighted light that a rectangle of a x b fills, seen from a point at
+/// distance h below one of its corners and facing it (Howell, configuration B-4).
 double corner_form_factor(double a, double b, double h) {
     const double x = a / h, y = b / h;
     const double p = std::sqrt(1 + x * x), q = std::sqrt(1 + y * y);
@@ -90,7 +90,7 @@ Scene scene_with_environment(Image picture, std::vector<LightSpec> lights = {}) 
 
 }  // namespace
 
-// ---- Irradiance, in closed form ------------------------------------------------------------------------------
+// ---- Irradiance, in closed form.
 
 TEST_CASE("irradiance: below a rectangle it is Lambert's form factor, at any scale") {
     for (const float scale : {1e-3f, 1.0f, 1e4f}) {
@@ -167,7 +167,7 @@ TEST_CASE("irradiance: lights of all kinds add up, also where those at infinity 
     }
 }
 
-// ---- Densities -----------------------------------------------------------------------------------------------
+// ---- Densities.
 
 TEST_CASE("what light sampling reports is what MIS computes for the same direction") {
     SceneParts parts = empty_parts();
@@ -197,7 +197,7 @@ TEST_CASE("what light sampling reports is what MIS computes for the same directi
             CHECK(radiance == sample->radiance);
         }
         CHECK(compared > 10'000);
-        // On the far half of the rim of a distant sphere rounding of the direction moves the point, and its cosine.
+        // At the rim of a distant sphere the rounded direction meets another point, of another cosine.
         CHECK(differ < compared / 200);
     }
 }
@@ -241,7 +241,7 @@ TEST_CASE("each light sampler draws directions with the density it reports") {
     }
 }
 
-// ---- What a sample may be ------------------------------------------------------------------------------------
+// ---- What a sample may be.
 
 TEST_CASE("a quad emits on the side of edge_u x edge_v only, and is black behind") {
     const Scene scene = small_scene({ceiling_light()});
@@ -272,7 +272,7 @@ TEST_CASE("materials emit from both sides unless the scene says otherwise") {
 }
 
 TEST_CASE("a textured emitter shines where its texture does, and through no hole") {
-    // Left half white, right half black (with 64 texels the bilinear ramp between them is 1/64 wide, and symmetric).
+    // Left half white, right half black; the ramp between them is one of 64 texels wide, and symmetric.
     Image8 halves{64, 1, 1, std::vector<std::uint8_t>(64)};
     std::fill_n(halves.bytes.begin(), 32, std::uint8_t(255));
     for (const bool as_hole : {false, true}) {
@@ -285,8 +285,8 @@ TEST_CASE("a textured emitter shines where its texture does, and through no hole
         const Scene scene = small_scene(std::move(parts), {EmissiveMtlSpec{}});
         CHECK(scene.has_cutouts == as_hole);
 
-        // Below the border between the halves, each of them has the share of half the form factor. The texture repeats,
-        // so at the outer border there is a ramp as well.
+        // Below the border between the halves, each of them has the share of half the form factor. The
+        // texture repeats, so at the outer border there is a ramp as well.
         const double expected = 2 * k_pi64 * 2 * corner_form_factor(1, 1.5, 2);
         for (const LightSampling sampling : k_both) {
             const Moments found =

@@ -56,9 +56,9 @@ struct CameraFrame {
 /// lie outside the image. Nothing if the point is not in front of the camera.
 [[nodiscard]] std::optional<Vec2> project_point(const CameraFrame& camera, Vec3 point);
 
-/// A view from the front (+z; -y where z is up), slightly above and beside the axis so that no axis-aligned plane
-/// is seen edge-on, in which the bounding sphere of the box just fits into an image of this aspect (width /
-/// height). For a bare .obj, which names no camera. An empty box gives the default camera.
+/// A view from the front (+z; -y where z is up), slightly above and beside the axis so that no axis-aligned
+/// plane is seen edge-on, in which the bounding sphere of the box just fits into an image of this aspect
+/// (width / height). For a bare .obj, which names no camera. An empty box gives the default camera.
 /// Requires: up is +y or +z; aspect > 0.
 [[nodiscard]] Camera camera_that_sees(const Box& bounds, Vec3 up = {0, 1, 0}, float aspect = 1);
 

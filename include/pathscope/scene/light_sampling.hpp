@@ -1,19 +1,21 @@
 #pragma once
 /// Towards a light: draw a direction in which light arrives, and say how likely any direction was.
 ///
-///   pdf_solid_angle = P(light) · pdf(direction | light)              for what has a surface or a solid angle
-///   pdf_area to pdf_solid_angle:  pdf_area · distance² / |cos θ'|    (two pdfs in different measures: never mix them)
+///   pdf_solid_angle = P(light) · pdf(direction | light)
+///                   = P(light) · pdf_area · distance² / |cos θ'|     of a point drawn on a surface
+///
+/// These two pdfs live in different measures, per solid angle and per area: what leaves here is always the first.
 ///
 /// How each kind is sampled, once picked (lights.hpp):
 ///   triangle     uniformly by area
-///   sphere       uniformly in the cone that it subtends; for LightSampling::area, uniformly over its whole surface,
-///                of which the far half is wasted. From inside it is dark: it emits outwards
+///   sphere       uniformly in the cone that it subtends; for LightSampling::area, uniformly over its whole
+///                surface, of which the far half is wasted. From inside it is dark: it emits outwards
 ///   point, sun of angle 0     the one direction there is
 ///   sun          uniformly in its cone
 ///   sky          by the cosine about the normal: its radiance is the same everywhere, the cosine is not
 ///   environment  in proportion to its radiance (environment.hpp)
-/// Lights from infinity overlap: a direction into the sun's disc is one into the sky as well. So whichever of them was
-/// picked, the sample carries the radiance of all, and the density of all: Σ P(i) pdf(direction | i).
+/// Lights from infinity overlap: a direction into the sun's disc is one into the sky as well. So whichever of
+/// them was picked, the sample carries the radiance of all and the density of all, Σ P(i) pdf(direction | i).
 ///
 /// Ensures: sample_light_pdf / sample_environment_pdf of what a ray along sample.direction meets is
 /// sample.pdf_solid_angle, up to rounding; MIS relies on it. Deltas have no such density and are never met.

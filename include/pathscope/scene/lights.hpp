@@ -3,17 +3,17 @@
 ///
 ///   Lr ≈ f Le cos θ / (P(light) pdf(direction | light))
 ///
-/// is one sample of the light that a point reflects. This header holds the lights and P(light); the densities of
-/// directions are in light_sampling.hpp. There are two ways to pick, for lessons to compare; both converge to the
-/// same image:
-///   area   the textbook: all emitting surface of the scene is one light, sampled uniformly, pdf_area = 1 / A.
-///          Lights without area (point, sun, sky, environment) get equal shares beside it: where there are k of
-///          them each is picked with probability 1 / (k + 1), and the surface with the rest.
-///   power  each light in proportion to the power that it sends out; light from infinity sends what falls on the
-///          disc that just covers the scene.
-/// Units: radiance W/(m² sr), intensity W/sr, irradiance W/m², each as linear Rgb. Powers are luminances of W.
-/// See: for area, Y. Huang, "A Distributed Path Tracer"; for power, Shirley, Wang & Zimmerman 1996, "Monte Carlo
-/// Techniques for Direct Lighting Calculations".
+/// is one sample of the light that a point reflects. This header holds the lights and P(light); the densities
+/// of directions are in light_sampling.hpp. There are two ways to pick, for lessons to compare; both converge
+/// to the same image:
+///   area   the textbook: all emitting surface together is one light, sampled uniformly, pdf_area = 1 / A.
+///          Lights without area (point, sun, sky, environment) get equal shares beside it: where there are k
+///          of them each is picked with probability 1 / (k + 1), and the surface with the rest.
+///   power  each light in proportion to the power that it sends out; light from infinity sends what falls on
+///          the disc that just covers the scene.
+/// Units: radiance W/(m² sr), intensity W/sr, irradiance W/m², each as linear Rgb; powers are luminances.
+/// See: for area, Y. Huang, "A Distributed Path Tracer"; for power, Shirley, Wang & Zimmerman 1996, "Monte
+/// Carlo Techniques for Direct Lighting Calculations".
 /// Thread safety: values, read only once finished.
 /// Test: tests/scene/test_lights.cpp     Lesson: lessons/04-light-sampling
 
@@ -56,8 +56,8 @@ struct PointLight {
     Rgb intensity;  ///< Irradiance at distance r, on a plane that faces the light, is intensity / r².
 };
 
-/// A disc at infinity: all directions within half of its angular diameter of to_sun. Of angle 0 it is a single
-/// direction, which only light sampling finds.
+/// A disc at infinity: all directions within half of its angular diameter of to_sun. Of angle 0 it is a
+/// single direction, which only light sampling finds.
 struct SunLight {
     Vec3 to_sun{0, 1, 0};     ///< Length one.
     Rgb irradiance;           ///< On a plane that faces the sun.

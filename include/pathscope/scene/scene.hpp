@@ -1,15 +1,17 @@
 #pragma once
 /// The scene as the renderer asks for it: what a ray meets, whether two points see each other, what shines.
 ///
-/// A Scene is complete and never changes: mesh (with the quads of the scene file), analytic spheres, materials with
-/// their textures, the tree over the triangles and the table of lights. A new state of the scene is a new Scene.
+/// A Scene is complete and never changes: mesh (with the quads of the scene file), analytic spheres,
+/// materials with their textures, the tree over the triangles and the table of lights. A new state of the
+/// scene is a new Scene.
 ///
-/// Cut-outs (map_d below 0.5) are holes for all rays, those of shadows too. Partial opacity is not: it belongs to the
-/// BSDF. Of surfaces that coincide, the triangle with the lowest number counts, and a triangle before a sphere.
-/// Emission. Materials say how much (ke times map_ke) and from which sides; the front is the side of the geometric
-/// normal (geometry/hit.hpp). Quads emit from the front only, where the front is the side of edge_u x edge_v, and
-/// spheres outwards; both reflect nothing.
-/// Units: scene units, radiance. Thread safety: all queries are pure; a Scene is read by any number of threads.
+/// Cut-outs (map_d below 0.5) are holes for all rays, those of shadows too. Partial opacity is not: it
+/// belongs to the BSDF. Of surfaces that coincide, the triangle with the lowest number counts, and a triangle
+/// before a sphere.
+/// Emission. Materials say how much (ke times map_ke) and from which sides; the front is the side of the
+/// geometric normal (geometry/hit.hpp). Quads emit from the front only, where the front is the side of edge_u
+/// x edge_v, and spheres outwards; both reflect nothing.
+/// Units: scene units, radiance. Thread safety: all queries are pure, a Scene is read by any number of threads.
 /// Test: tests/scene/test_scene.cpp
 
 #include <cstdint>
@@ -47,15 +49,15 @@ struct Scene {
     LightTable lights;
     Box bounds;                ///< Of mesh and spheres.
     bool has_cutouts = false;  ///< Else rays need not ask.
-    /// What image/exact_sum.hpp makes its quantum of: radiance of a surface well lit, and of the brightest emitter.
+    /// What quantum_for() asks (image/exact_sum.hpp): a surface well lit, and the brightest emitter.
     float typical_radiance = 0, brightest_radiance = 0;
 };
 
-/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. `threads`: 0 = all
-/// cores; the result does not depend on it. Materials emit if the file lists emissive_mtl, or no light at all (a bare
-/// .obj). A scene without light is black, and said to be, but is no error. Refuses lights that are no lights: a quad
-/// without area, a negative radiance. Requires: validate(parts.mesh), materials and textures as load_scene_parts
-/// gives them.
+/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. `threads`:
+/// 0 = all cores; the result does not depend on it. Materials emit if the file lists emissive_mtl, or no
+/// light at all (a bare .obj). A scene without light is black, and said to be, but is no error.
+/// Refuses an environment map that is none, and a scene too large for floats. Requires: lights as
+/// parse_scene_file gives them, parts as load_scene_parts does.
 [[nodiscard]] Result<Scene> make_scene(const SceneFile& file, SceneParts parts, int threads = 0);
 
 inline constexpr std::uint32_t k_no_triangle = 0xffffffffu;
@@ -72,7 +74,7 @@ struct SceneHit {
 /// Whether anything lies in [t_min, t_max] of the ray.
 [[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);
 
-/// The same, seen by a probe (bvh/traversal_probe.hpp): for the traversal-cost buffer, and to step through a ray.
+/// The same, seen by a probe (bvh/traversal_probe.hpp): for the traversal-cost buffer, and to step through.
 template <class Probe>
 [[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, Probe& probe);
 
@@ -85,10 +87,10 @@ template <class Probe>
 /// False in the holes of the triangle's cut-out.
 [[nodiscard]] bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v);
 
-/// Half the diagonal of Scene::bounds; 1 where there is none, so that light from infinity has a disc to fall on.
+/// Half the diagonal of Scene::bounds; 1 if that is 0, so that light from infinity has a disc to fall on.
 [[nodiscard]] float scene_radius(const Scene& scene);
 
-// ---------------------------------------------------------------------------------------------------------------
+// ---- Inline, for the probe to be compiled in.
 
 namespace detail {
 [[nodiscard]] std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray,

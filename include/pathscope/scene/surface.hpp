@@ -1,15 +1,15 @@
 #pragma once
 /// A hit made ready for shading: its BSDF with the textures looked up, and the frame to evaluate it in.
 ///
-/// Surfaces are seen from both sides: the frame is turned so that `outgoing` is above it. Only a body of glass has an
-/// inside; its frame keeps pointing outwards (shading/bsdf.hpp).
+/// Surfaces are seen from both sides: the frame is turned so that `outgoing` is above it. Only a body of
+/// glass has an inside; its frame keeps pointing outwards (shading/bsdf.hpp).
 ///
-/// Interpolated normals lie: they pretend a curve that the triangles do not follow. Three rules keep the lie from
-/// showing:
-/// - Light does not leak through. `incoming` must lie on that side of the triangle on which the shading frame has it;
-///   else is_consistent() is false and the direction carries nothing.
-/// - No black rims. Where the mirror direction of `outgoing` about the normal would dip below the triangle, the normal
-///   is bent back just so far that it does not. So `outgoing` is above both normals or below both.
+/// Interpolated normals lie: they pretend a curve that the triangles do not follow. Three rules keep the lie
+/// from showing:
+/// - Light does not leak through. `incoming` must lie on that side of the triangle on which the shading frame
+///   has it; else is_consistent() is false and the direction carries nothing.
+/// - No black rims. Where the mirror direction of `outgoing` about the normal would dip below the triangle,
+///   the normal is bent back just so far that it does not. So `outgoing` is above both planes or below both.
 /// - Rays start off the triangle itself (geometry/spawn.hpp).
 /// Thread safety: pure.   Test: tests/scene/test_surface.cpp
 
