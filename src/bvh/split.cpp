@@ -29,6 +29,11 @@ struct BinMap {
     }
 };
 
+/// Few triangles need few bins: the same cost of the tree, in half of the time (Wald 2007).
+int bins_for(std::size_t triangles, const BvhBuildParams& params) {
+    return std::min<int>(params.bins, 4 + static_cast<int>(triangles / 4));
+}
+
 using Bins = std::array<Bin, k_max_bins>;
 
 /// A count times an area is the expected number of triangle tests, up to the area of the parent.
@@ -61,26 +66,25 @@ void improve(std::optional<BinnedSplit>& best, const Bins& bins, int axis, int b
 
 std::optional<BinnedSplit> find_binned_split(std::span<const BuildTriangle> range, const RangeBounds& bounds,
                                              const BvhBuildParams& params) {
-    const std::array<BinMap, 3> maps{BinMap(bounds.centroids, 0, params.bins),
-                                     BinMap(bounds.centroids, 1, params.bins),
-                                     BinMap(bounds.centroids, 2, params.bins)};
+    const int bin_count = bins_for(range.size(), params);
     std::optional<BinnedSplit> best;
     for (int axis = 0; axis < 3; ++axis) {
-        if (!maps[axis].usable()) continue;
+        const BinMap map(bounds.centroids, axis, bin_count);
+        if (!map.usable()) continue;
         Bins bins;
         for (const BuildTriangle& triangle : range) {
-            Bin& bin = bins[maps[axis](triangle.centroid()[axis])];
+            Bin& bin = bins[map(triangle.centroid()[axis])];
             bin.box.add(triangle.box);
             ++bin.count;
         }
-        improve(best, bins, axis, params.bins, params.box_cost, bounds.boxes.half_area());
+        improve(best, bins, axis, bin_count, params.box_cost, bounds.boxes.half_area());
     }
     return best;
 }
 
 std::size_t partition_at(const BinnedSplit& split, BuildRange range, const RangeBounds& bounds,
                          const BvhBuildParams& params) {
-    const BinMap map(bounds.centroids, split.axis, params.bins);
+    const BinMap map(bounds.centroids, split.axis, bins_for(range.size(), params));
     const auto middle = std::partition(range.begin(), range.end(), [&](const BuildTriangle& triangle) {
         return map(triangle.centroid()[split.axis]) < split.first_right_bin;
     });

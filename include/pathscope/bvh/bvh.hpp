@@ -79,7 +79,7 @@ constexpr const auto& enum_table(BvhSplit) { return k_bvh_split_names; }
 
 struct BvhBuildParams {
     BvhSplit split = BvhSplit::sah;
-    int bins = 16;               ///< Per axis, 2 to 32.
+    int bins = 32;               ///< Per axis, 2 to 32; small nodes use fewer.
     int max_leaf_triangles = 8;  ///< A node with more is always split; 1 to 64.
     float box_cost = 1;          ///< C_box: of visiting a node (both children's boxes), in triangle tests.
     int max_depth = k_bvh_max_depth;
