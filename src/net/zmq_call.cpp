@@ -149,7 +149,7 @@ Result<SocketHandle> open_socket(const Context& context, int type, const SocketO
     set_option(socket, ZMQ_BACKLOG, options.backlog);
     set_option(socket, ZMQ_TCP_KEEPALIVE, 1);
     set_option(socket, ZMQ_HEARTBEAT_IVL, options.transport_heartbeat_ms);
-    set_option(socket, ZMQ_HEARTBEAT_TIMEOUT, 5 * options.transport_heartbeat_ms);
+    set_option(socket, ZMQ_HEARTBEAT_TIMEOUT, 6 * options.transport_heartbeat_ms);
     std::visit(SetSecurity{socket}, options.security);
     return handle;
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// The few ZeroMQ calls that all sockets share. Plain C API: its errors are values, so no exception needs catching.
+/// The few ZeroMQ calls that all sockets share. Plain C API: its errors are values, so no exception needs
+/// catching.
 
 #include <zmq.h>
 
@@ -27,8 +28,8 @@ void set_option(void* socket, int option, std::string_view value);
 [[nodiscard]] Result<void> connect_socket(void* socket, const std::string& endpoint);
 [[nodiscard]] std::string bound_endpoint(void* socket);
 
-/// Sends all frames as one message, never blocking. Returns 0, or the errno of the first frame, in which case nothing was
-/// sent and nothing taken. The leading frame (an address) may be null.
+/// Sends all frames as one message, never blocking. Returns 0, or the errno of the first frame, in which case
+/// nothing was sent and nothing taken. The leading frame (an address) may be null.
 [[nodiscard]] int send_frames(void* socket, const std::string* leading, Frames& frames);
 
 /// The next message that is waiting; of one with more than k_max_frames, only the first ones are kept.

@@ -1,9 +1,9 @@
 #pragma once
 /// The fields of every message, written once.
 ///
-/// describe(field, message) names each field with its type and limits, and then the payload. Four visitors walk it: the
-/// one that encodes, the one that decodes, the one that lists fields for the document's test, and the one that
-/// prints a line for people. So none of them can forget or misname a field.
+/// describe(field, message) names each field with its type and limits, and then the payload. Four visitors
+/// walk it: the one that encodes, the one that decodes, the one that lists fields for the document's test,
+/// and the one that prints a line for people. So none of them can forget or misname a field.
 
 #include <concepts>
 #include <cstdint>

@@ -71,8 +71,8 @@ TEST_CASE("peers that speak no ZeroMQ harm nobody") {
     auto dealer = DealerSocket::connect(context, router->endpoint(), "d");
     REQUIRE(testing::send_once_connected(*dealer, {"x"}) == SendOutcome::delivered);
 
-    // ZeroMQ still understands its first version, which had no greeting: some garbage passes for a message of a
-    // nameless peer. So what a socket receives has been checked by nobody yet.
+    // ZeroMQ still understands its first version, which had no greeting: some garbage passes for a message of
+    // a nameless peer. So what a socket receives has been checked by nobody yet.
     CHECK(soon(*router, [&] {
         const auto message = router->receive();
         return message && message->peer == "d" && message->frames == Frames{"x"};

@@ -123,7 +123,8 @@ TEST_CASE("a dealer sends only over a connection that stands") {
     CHECK(dealer->send(std::move(frames)) == SendOutcome::would_block);
     CHECK(frames == Frames{"kept"});
 
-    // The other side starts second. The port was free a moment ago; if it is taken by now, this test says nothing.
+    // The other side starts second. The port was free a moment ago; if it is taken by now, this test says
+    // nothing.
     auto router = RouterSocket::bind(context, endpoint);
     if (!router) return;
     CHECK(send_once_connected(*dealer, std::move(frames)) == SendOutcome::delivered);

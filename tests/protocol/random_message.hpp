@@ -1,6 +1,6 @@
 #pragma once
-/// Messages with random content within every limit, made by walking the fields like encode() does. A field that is
-/// added to a message is thereby tested without a change here.
+/// Messages with random content within every limit, made by walking the fields like encode() does. A field
+/// that is added to a message is thereby tested without a change here.
 
 #include <algorithm>
 #include <utility>

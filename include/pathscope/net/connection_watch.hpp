@@ -1,9 +1,10 @@
 #pragma once
 /// Connections as they come and go, told by ZeroMQ itself.
 ///
-/// A process that dies closes its connection, and that is known here within milliseconds, long before heartbeats miss it.
-/// ZeroMQ does not say whose connection it was: send each peer something, and the dead one is `unreachable`
-/// (router.hpp). A machine that hangs or a cable that is cut closes nothing; that is what heartbeats are for.
+/// A process that dies closes its connection, and that is known here within milliseconds, long before
+/// heartbeats miss it. ZeroMQ does not say whose connection it was: send each peer something, and the dead
+/// one is `unreachable` (router.hpp). A machine that hangs or a cable that is cut closes nothing; that is
+/// what heartbeats are for.
 ///
 ///     const ConnectionChanges changes = watch.take_changes();
 ///     if (changes.lost > 0) ping_all_servers();

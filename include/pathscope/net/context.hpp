@@ -1,8 +1,8 @@
 #pragma once
 /// The ZeroMQ context: the I/O threads that move messages, and the namespace of inproc:// addresses.
 ///
-/// One per process is the rule. Sockets keep their context alive, so that the order in which a context and its
-/// sockets go out of scope does not matter: the last one to go waits for what linger allows to be sent.
+/// One per process is the rule. Sockets keep their context alive, so that the order in which a context and
+/// its sockets go out of scope does not matter: the last one to go waits for what linger allows to be sent.
 /// Thread safety: yes.   Test: tests/net/test_router_dealer.cpp
 
 #include <memory>

@@ -1,10 +1,10 @@
 #pragma once
 /// DEALER: the many that talk to one ROUTER, without waiting for answers in turn.
 ///
-/// A dealer here has one connection, dials for ever, and sends only over a connection that stands (IMMEDIATE):
-/// before that, and after the router went away, send() says would_block and nothing is buffered.
-/// Why a fresh id per incarnation: a ROUTER keeps the id of a connection it has not yet noticed to be dead, and
-/// refuses or blackholes a peer that returns under the same one (libzmq issues 778, 2019, 2892).
+/// A dealer here has one connection, dials for ever, and sends only over a connection that stands
+/// (IMMEDIATE): before that, and after the router went away, send() says would_block and nothing is buffered.
+/// Why a fresh id per incarnation: a ROUTER keeps the id of a connection it has not yet noticed to be dead,
+/// and refuses or blackholes a peer that returns under the same one (libzmq issues 778, 2019, 2892).
 /// Thread safety: one thread (socket.hpp).   Source: ZeroMQ RFC 28.   Test: tests/net/test_router_dealer.cpp
 
 #include <optional>

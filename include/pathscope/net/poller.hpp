@@ -1,13 +1,13 @@
 #pragma once
 /// Wait for several sockets at once.
 ///
-///     const Readable ready = wait_readable({monitor.pollable(), frames.pollable(), wake.pollable()}, timeout);
+///     const Readable ready = wait_readable({monitor.pollable(), wake.pollable()}, timeout);
 ///     if (ready[0]) drain(monitor, 100, handle_monitor);
 ///
-/// Why a function and no object: sockets come and go (a server that lost its client opens new ones), and a list made
-/// for each wait cannot hold a socket that is closed.
-/// Units: nanoseconds, rounded up to whole milliseconds; negative = without end. A signal ends the wait early, with nothing
-/// readable.
+/// Why a function and no object: sockets come and go (a server that lost its client opens new ones), and a
+/// list made for each wait cannot hold a socket that is closed.
+/// Units: nanoseconds, rounded up to whole milliseconds; negative = without end. A signal ends the wait
+/// early, with nothing readable.
 /// Thread safety: the thread that owns the sockets.   Test: tests/net/test_poller.cpp
 
 #include <bitset>

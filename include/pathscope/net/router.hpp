@@ -3,11 +3,11 @@
 ///
 ///     RouterSocket    binds; receive() tells who spoke, send() names who shall hear it
 ///
-/// Why "mandatory": a plain ROUTER drops messages for peers it does not know or that do not keep up, silently.
-/// With ROUTER_MANDATORY both are told to the sender, and a peer that died is noticed by the next message to it
-/// instead of by a timeout.
-/// Why no handover: a peer whose id is taken is refused. Peers choose fresh random ids (dealer.hpp), so a taken id is
-/// either the same peer's dead connection or an impostor.
+/// Why "mandatory": a plain ROUTER drops messages for peers it does not know or that do not keep up,
+/// silently. With ROUTER_MANDATORY both are told to the sender, and a peer that died is noticed by the next
+/// message to it instead of by a timeout.
+/// Why no handover: a peer whose id is taken is refused. Peers choose fresh random ids (dealer.hpp), so a
+/// taken id is either the same peer's dead connection or an impostor.
 /// Thread safety: one thread (socket.hpp).   Source: ZeroMQ RFC 28, zguide chapter 3.
 /// Test: tests/net/test_router_dealer.cpp
 

@@ -8,9 +8,11 @@
 ///              options.security = Listener{client_keys};
 ///     server:  options.security = Dialler{server_keys, client_public_key};
 ///
-/// A connection without a right key never reaches the application: its handshake fails, and ConnectionWatch counts it.
-/// Without security, bind only where reaches_other_machines() is false, or because the user insisted.
-/// Convention: keys are text of 40 characters (Z85).   Cost: about 1 ms per handshake; 0.4 GB/s instead of 2.5.
+/// A connection without a right key never reaches the application: its handshake fails, and ConnectionWatch
+/// counts it. Without security, bind only where reaches_other_machines() is false, or because the user
+/// insisted.
+/// Convention: keys are text of 40 characters (Z85).   Cost: about 1 ms per handshake; 0.4 GB/s instead of
+/// 2.5.
 /// Source: ZeroMQ RFCs 25 (CURVE), 26 (CurveZMQ), 27 (ZAP); Bernstein, "CurveCP".
 /// Thread safety: yes.   Test: tests/net/test_security.cpp
 
@@ -37,7 +39,8 @@ struct KeyPair {
 /// Whether the text can be a key: 40 characters of Z85 that stand for 32 bytes.
 [[nodiscard]] bool is_key(std::string_view text);
 
-/// Options of a socket that binds. Requires admit_only() before: without a list, ZeroMQ would admit every key.
+/// Options of a socket that binds. Requires admit_only() before: without a list, ZeroMQ would admit every
+/// key.
 struct Listener {
     KeyPair keys;
 };
@@ -51,8 +54,8 @@ struct Dialler {
 /// monostate: no keys, everything in the clear.
 using Security = std::variant<std::monostate, Listener, Dialler>;
 
-/// From here on, handshakes with listeners of this context succeed for these public keys and no others. A second
-/// call replaces the list; connections that stand stay. Refuses what is no key.
+/// From here on, handshakes with listeners of this context succeed for these public keys and no others. A
+/// second call replaces the list; connections that stand stay. Refuses what is no key.
 [[nodiscard]] Result<void> admit_only(const Context& context, const std::vector<std::string>& public_keys);
 
 /// Whether a listening endpoint can be reached from other machines: true for all but inproc, ipc and the

@@ -2,10 +2,12 @@
 /// What every socket has in common: options, outcomes of sending, bounded draining.
 ///
 /// ZeroMQ sockets are not thread safe: a socket belongs to the one thread that uses it (it may be handed over
-/// to another, once, with a memory barrier as std::thread gives). Other threads leave work in a queue and ring
-/// the WakePair (wake_pair.hpp). Nothing here blocks but wait_readable() (poller.hpp) and the end of a Context.
+/// to another, once, with a memory barrier as std::thread gives). Other threads leave work in a queue and
+/// ring the WakePair (wake_pair.hpp). Nothing here blocks but wait_readable() (poller.hpp) and the end of a
+/// Context.
 /// Addresses: "tcp://127.0.0.1:5556", "tcp://*:5556", "tcp://127.0.0.1:*" (any free port), "ipc:///tmp/name",
-/// "inproc://name". Interrupted system calls (EINTR) are no errors: the call is repeated, or a wait ends early.
+/// "inproc://name". Interrupted system calls (EINTR) are no errors: the call is repeated, or a wait ends
+/// early.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,8 +23,7 @@
 
 namespace pathscope {
 
-/// Limits that keep one peer from taking all memory, and times in which the transport itself notices that a
-/// connection is dead. The session's heartbeats are faster; these clean up below them.
+/// Limits that keep one peer from taking all memory, and the times of the transport.
 struct SocketOptions {
     std::int64_t max_frame_bytes =
         (8 << 20) + (64 << 10);   ///< A peer that sends a larger frame is disconnected.
@@ -31,7 +32,10 @@ struct SocketOptions {
     int linger_ms = 0;            ///< How long unsent messages outlive their socket.
     int reconnect_ms = 100;       ///< First pause before dialling again, doubling...
     int reconnect_max_ms = 5000;  ///< ...up to this.
-    int transport_heartbeat_ms = 1000;  ///< ZMTP ping on a silent connection; five unanswered ones close it.
+    /// A silent connection is pinged so often, and closed after six unanswered pings. Far slower than the
+    /// session's heartbeats, so that a server that is only frozen is judged by the failure detector and not
+    /// by the transport.
+    int transport_heartbeat_ms = 5000;
     int backlog = 4096;  ///< Connections waiting to be accepted: servers may join by the hundred.
     Security security;   ///< Keys (security.hpp); none by default.
 };

@@ -5,9 +5,9 @@
 ///     I/O thread:     wait_readable({monitor.pollable(), wake.pollable()}, timeout);
 ///                     wake.clear();      take all of the queue
 ///
-/// Why: render threads must not touch sockets, and the I/O thread must not poll a queue. Rings add up to one: clear
-/// before taking from the queue, and no item can be missed. It is a pipe; a ZeroMQ PAIR would itself be bound to
-/// one thread at each end.
+/// Why: render threads must not touch sockets, and the I/O thread must not poll a queue. Rings add up to one:
+/// clear before taking from the queue, and no item can be missed. It is a pipe; a ZeroMQ PAIR would itself be
+/// bound to one thread at each end.
 /// Thread safety: notify() from any thread and from signal handlers; clear() from the waiting thread.
 /// Test: tests/net/test_poller.cpp
 

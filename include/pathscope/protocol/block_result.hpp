@@ -4,7 +4,8 @@
 ///     server:  put_block_result(tile, sums);              // sets codec, raw_bytes, hash, result
 ///     client:  block_result(std::move(tile), rect.area()) // checks all four, gives the sums back
 ///
-/// Layout before packing: pixels row by row, for each three int64 little-endian (red, green, blue), in quanta.
+/// Layout before packing: pixels row by row, for each three int64 little-endian (red, green, blue), in
+/// quanta.
 /// Ensures: sums that come back are in range for the tile's count (image/exact_sum.hpp), so that they may be
 /// added without overflow.
 /// Thread safety: values.   Test: tests/protocol/test_block_result.cpp

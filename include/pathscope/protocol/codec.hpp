@@ -7,8 +7,8 @@
 ///     if (!decoded) return count(decoded.error().fault, decoded.error().sentence);
 ///     std::visit(handler, *decoded);
 ///
-/// Invariant: decode(encode(m)) == m for every m within its limits; whatever else arrives is an error with its kind and one
-/// sentence that names message and field ("TILE: field 'count' is missing."), never a crash.
+/// Invariant: decode(encode(m)) == m for every m within its limits; whatever else arrives is an error with
+/// its kind and one sentence that names message and field ("TILE: field 'count' is missing."), never a crash.
 /// Safety: memory is bounded by a small multiple of the bytes received. Payloads are moved, not copied.
 /// Thread safety: yes.   Test: tests/protocol/test_codec.cpp, tests/protocol/test_hostile.cpp
 
@@ -65,8 +65,8 @@ class [[nodiscard]] Decoded {
     std::variant<Message, DecodeError> content_;
 };
 
-/// Requires: every field within its limits (a field beyond them is a bug of the sender), except that `text` of
-/// REJECT, BYE and NACK may be any string: it is made printable and cut.
+/// Requires: every field within its limits (a field beyond them is a bug of the sender), except that `text`
+/// of REJECT, BYE and NACK may be any string: it is made printable and cut.
 [[nodiscard]] Frames encode(Message message);
 
 /// `receiver` is the side that decodes, `channel` the socket the frames came from.

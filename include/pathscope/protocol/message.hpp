@@ -1,8 +1,8 @@
 #pragma once
 /// The messages, as plain data. docs/protocol.md says what each field means, in which unit, and its limits.
 ///
-/// Every message is absolute and stands for itself: none is relative to one before it. Those that belong to a run of
-/// the client carry its session, so that what an earlier run left in a queue is told apart.
+/// Every message is absolute and stands for itself: none is relative to one before it. Those that belong to a
+/// run of the client carry its session, so that what an earlier run left in a queue is told apart.
 /// Why a namespace: a message::Lease is what crosses the wire; the ledger's lease is something else.
 /// Thread safety: values.   Test: tests/protocol/test_codec.cpp
 

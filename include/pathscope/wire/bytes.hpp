@@ -4,8 +4,8 @@
 ///     ByteWriter out;                      ByteReader in(out.bytes());
 ///     out.little(std::uint32_t{7});        in.little<std::uint32_t>() == 7
 ///
-/// Why: a length that arrives over the wire is a claim. A reader that cannot step past its end makes the claim
-/// harmless: a miss is an empty optional, and the reader stays where it was.
+/// Why: a length that arrives over the wire is a claim. A reader that cannot step past its end makes the
+/// claim harmless: a miss is an empty optional, and the reader stays where it was.
 /// Convention: payloads are little-endian, MessagePack is big-endian. Floats go as their IEEE 754 bits.
 /// Thread safety: as std::string.   Test: tests/wire/test_bytes.cpp
 

@@ -6,9 +6,9 @@
 ///     credit.credits = fields.u32("credits", 0, 1024);
 ///     if (auto wrong = fields.error()) return *wrong;      // CREDIT: field 'credits' is missing.
 ///
-/// The first thing that is wrong is kept; from then on fields return their least value. So a decoder is a list of
-/// fields, and cannot forget a check. The sentence names the context and the field. Unknown keys are no
-/// error, unless only() is asked for.
+/// The first thing that is wrong is kept; from then on fields return their least value. So a decoder is a
+/// list of fields, and cannot forget a check. The sentence names the context and the field. Unknown keys are
+/// no error, unless only() is asked for.
 /// Convention: sizes of texts and bytes are in bytes. Requires: the map outlives the reader.
 /// Thread safety: one thread.   Test: tests/wire/test_field_reader.cpp
 

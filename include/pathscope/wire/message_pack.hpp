@@ -7,12 +7,15 @@
 ///     const std::string bytes = pack(PackValue(map));
 ///     const Result<PackValue> back = unpack(bytes);       // *back == PackValue(map)
 ///
-/// Kinds: nil, bool, integers of 64 bits, floats of 64 bits, text (UTF-8), bytes, arrays, maps with text keys.
+/// Kinds: nil, bool, integers of 64 bits, floats of 64 bits, text (UTF-8), bytes, arrays, maps with text
+/// keys.
 /// Canonical: one value has one encoding (shortest integers and lengths, floats as 64 bits, keys in the order
-/// they were set), so that hashes of packed values are hashes of values. unpack() accepts the longer forms too.
+/// they were set), so that hashes of packed values are hashes of values. unpack() accepts the longer forms
+/// too.
 /// Invariant: a key is at most once in a map; an integer that is not negative is kept as unsigned, so that
 /// equal numbers are equal values.
-/// Why not a library: fifteen prefixes are less code than a dependency, and every limit below is ours to test.
+/// Why not a library: fifteen prefixes are less code than a dependency, and every limit below is ours to
+/// test.
 /// Source: github.com/msgpack/msgpack/blob/master/spec.md. Extension types are refused.
 /// Thread safety: as std::string.   Test: tests/wire/test_message_pack.cpp
 
