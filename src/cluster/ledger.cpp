@@ -233,12 +233,7 @@ Commit Ledger::commit(const ResultClaim& claim, TimeNs now) {
     units_[lease.unit].samples += lease.count;
     ++counts_.accepted;
     note(lease, UnitChange::committed, commit.late ? UnitReason::late_result : UnitReason::result, now);
-    if (store_ != nullptr) {
-        store_->count_all(
-            {{Counter::rounds_committed, 1}, {Counter::tiles, 1}, {Counter::samples, lease.count}},
-            lease.server);
-        store_->add_latency(Latency::tile, commit.since_grant, lease.server);
-    }
+    count(Counter::rounds_committed, 1, lease.server);
     return commit;
 }
 

@@ -12,8 +12,8 @@ constexpr TimeNs k_beat = 250 * k_millisecond_ns;
 constexpr TimeNs k_tick = 20 * k_millisecond_ns;
 constexpr TimeNs k_epilogue = 30 * k_second_ns;  ///< After the end: late results still come.
 
-// Without progress though someone could work: a frozen or dead server is found, and its work is done by another.
-// When messages are lost, several leases may have to time out one after the other.
+// Without progress though someone could work: a frozen or dead server is found, and its work is done by
+// another. When messages are lost, several leases may have to time out one after the other.
 constexpr TimeNs k_longest_wait = 45 * k_second_ns;
 constexpr TimeNs k_longest_wait_lossy = 900 * k_second_ns;
 constexpr TimeNs k_longest_run = 20'000 * k_second_ns;
@@ -84,7 +84,7 @@ std::string FakeCluster::run() {
     return failure_;
 }
 
-// -- The world -----------------------------------------------------------------------------------------------
+// -- The world ----------------------------------------------------------------------------------------------
 
 void FakeCluster::at(TimeNs when, std::function<void()> happens) {
     happenings_.push({{when, ++order_}, std::move(happens)});
@@ -126,7 +126,7 @@ void FakeCluster::strike() {
         leave(p);
 }
 
-// -- Servers -------------------------------------------------------------------------------------------------
+// -- Servers ------------------------------------------------------------------------------------------------
 
 void FakeCluster::start_process() {
     processes_.push_back({});
@@ -210,7 +210,7 @@ void FakeCluster::leave(std::size_t p) {
     send([this, id = processes_[p].id] { on_good_bye(id); });
 }
 
-// -- The client ----------------------------------------------------------------------------------------------
+// -- The client ---------------------------------------------------------------------------------------------
 
 void FakeCluster::on_hello(std::size_t p) {
     Process& process = processes_[p];
@@ -390,7 +390,7 @@ void FakeCluster::crash_and_resume() {
     tell_schedule();
 }
 
-// -- The oracle ----------------------------------------------------------------------------------------------
+// -- The oracle ---------------------------------------------------------------------------------------------
 
 void FakeCluster::merge(const Result& result) {
     const ResultClaim& claim = result.claim;

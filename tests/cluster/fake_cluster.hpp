@@ -1,10 +1,10 @@
 #pragma once
-/// A client and N servers in virtual time, over a network that delays, drops, doubles and reorders, with servers
-/// that die, freeze, leave, join, refuse and lie. Everything follows from the seed.
+/// A client and N servers in virtual time, over a network that delays, drops, doubles and reorders, with
+/// servers that die, freeze, leave, join, refuse and lie. Everything follows from the seed.
 ///
-/// The client is a miniature session: ledger, schedule, peers, credits, detectors and lease lengths work together
-/// as in the real one. Beside it runs an oracle that knows nothing of the ledger: it keeps what was merged, and
-/// what should be. After every event:
+/// The client is a miniature session: ledger, schedule, peers, credits, detectors and lease lengths work
+/// together as in the real one. Beside it runs an oracle that knows nothing of the ledger: it keeps what was
+/// merged, and what should be. After every event:
 ///   no round is merged twice, and none of another image than the present one;
 ///   the ledger's audit holds (conservation of leases, results, rounds; bounded records);
 ///   while work is left and somebody could do it, rounds are merged.

@@ -14,7 +14,8 @@ namespace {
 
 constexpr TimeNs k_beat = 250 * k_millisecond_ns;
 
-/// The first moment after `now`, looked for every millisecond, at which the state is at least that; limit if never.
+/// The first moment after `now`, looked for every millisecond, at which the state is at least that; limit if
+/// never.
 TimeNs when(const FailureDetector& detector, Liveness state, TimeNs now, TimeNs limit) {
     while (now < limit && detector.assess(now).state < state) now += k_millisecond_ns;
     return now;
@@ -78,8 +79,9 @@ TEST_CASE("adaptive: a process frozen for 10 s is found within a second or so, a
 }
 
 TEST_CASE("adaptive: no false death from jitter, and few suspicions") {
-    // 64 servers for ten minutes of beats. Gaps as measured with 128 saturated processes on two cores: 250 ms each,
-    // one in 1000 above 492 ms, the longest 701 ms. A lateness of -L ln(u) has P(> 242 ms) = 1/1000 for L = 35 ms.
+    // 64 servers for ten minutes of beats. Gaps as measured with 128 saturated processes on two cores: 250 ms
+    // each, one in 1000 above 492 ms, the longest 701 ms. A lateness of -L ln(u) has P(> 242 ms) = 1/1000 for
+    // L = 35 ms.
     int suspicions = 0, deaths = 0, beats = 0;
     for (std::uint32_t server = 0; server < 64; ++server) {
         HashRng rng(1000 + server);

@@ -199,7 +199,8 @@ TEST_CASE("after a checkpoint the units that are behind come first") {
 }
 
 TEST_CASE("makespans are what arithmetic says: static waits for the slowest, the others do not") {
-    // Four servers, one at a quarter of the speed: 96 units x 4 rounds of a second each, ideal 384 / 3.25 = 118 s.
+    // Four servers, one at a quarter of the speed: 96 units x 4 rounds of a second each, ideal 384 / 3.25 =
+    // 118 s.
     const std::vector<double> seconds{1, 1, 1, 4};
     CHECK(makespan(ScheduleKind::static_shares, 96, 4, seconds) == 384 / 4 * 4);
     CHECK(makespan(ScheduleKind::pull, 96, 4, seconds) <= 384 / 3.25 + 4);

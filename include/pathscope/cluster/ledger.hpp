@@ -24,8 +24,9 @@
 /// How a duplicate is known without a record of it: a unit's rounds are first granted in rising order, so
 /// `index < fresh` means "was granted", and without a record, "is committed".
 ///
-/// No socket, no clock (`now` is an argument and never falls). What is decided is written to the event store
-/// with its reason, if there is one. Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
+/// No socket, no clock (`now` is an argument and never falls). If there is an event store, every decision is
+/// recorded there with its reason, and counted (rounds, leases, refused results; who merges counts samples,
+/// tiles and latency). Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
 /// Thread safety: one thread at a time.
 /// Test: tests/cluster/test_ledger.cpp, test_simulation.cpp
 

@@ -22,8 +22,8 @@ enum class Counter {
     refused_results,     ///< Results that belong to no lease, or not to the lease they name.
     bad_messages,        ///< Malformed, oversized, out of place, unauthorised.
     nonfinite_dropped,   ///< Samples whose radiance was not finite or negative.
-    samples,             ///< Samples of units, committed.
-    tiles,               ///< Results accepted.
+    samples,             ///< Of pixels, merged; rounds_committed counts what they came in.
+    tiles,               ///< Results of servers that were merged.
     rays,
     bytes_in,
     bytes_out,
