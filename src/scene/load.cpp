@@ -67,6 +67,10 @@ void simplify(MaterialSource& source, MaterialModel model) {
         m.kind = MaterialKind::lambert;
         m.opacity = 1;
         m.metallic = 0;
+        if (m.emits()) {  // A light is only a light then, as in the renderers that the model is compared with.
+            m.kd = {};
+            source.map_kd = {};
+        }
     }
     const bool is_glass = m.kind == MaterialKind::dielectric || m.kind == MaterialKind::thin_glass;
     if (is_glass) m.opacity = 1;

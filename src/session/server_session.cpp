@@ -147,10 +147,13 @@ void ServerSession::receive(Socket& socket, Channel channel) {
 
 TimeNs ServerSession::next_timer(TimeNs now) const {
     TimeNs next = now + k_idle_wait;
-    if (phase_ == Phase::hello) return std::min(next, next_hello_);
-    next = std::min({next, next_ping_, last_heard_ + dead_after_});
-    if (missed_since_) next = std::min(next, *missed_since_ + heartbeat_);
-    if (!unsent_answers_.empty()) next = std::min(next, now + k_millisecond_ns);
+    if (phase_ == Phase::hello) {
+        next = std::min(next, next_hello_);
+    } else {
+        next = std::min({next, next_ping_, last_heard_ + dead_after_});
+        if (missed_since_) next = std::min(next, *missed_since_ + heartbeat_);
+        if (!unsent_answers_.empty()) next = std::min(next, now + k_millisecond_ns);
+    }
     return std::max(next, now);
 }
 
