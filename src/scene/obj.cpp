@@ -172,6 +172,7 @@ std::size_t build_mesh(ObjFaces& faces, Mesh& mesh) {
 }  // namespace
 
 Result<ObjModel> parse_obj(std::string text, const std::string& shown_path, bool smoothing) {
+    if (text.starts_with("\xef\xbb\xbf")) text.replace(0, 3, 3, ' ');  // A byte order mark of UTF-8.
     const std::vector<std::size_t> joined = join_continued_lines(text);
     Result<ObjOutline> outline = check_obj(text, joined, shown_path);
     if (!outline) return outline.error();

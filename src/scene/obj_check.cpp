@@ -164,7 +164,7 @@ class ObjChecker {
     }
 
     bool check_index(std::string_view word, IndexRange& range, std::uint32_t count_so_far) {
-        if (word.starts_with('+')) word.remove_prefix(1);
+        if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
         std::int64_t index = 0;
         const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), index);
         if (failure == std::errc::invalid_argument || end != word.data() + word.size()) return false;

@@ -55,6 +55,7 @@ std::string corner_of_a_box(const std::string& smoothing) {
 TEST_CASE("a face is a face, however it is written") {
     for (const std::string& text : {
              k_square + "f 1 2 3 4\n",
+             "\xef\xbb\xbf" + k_square + "f 1 2 3 4\n",
              k_square + "f -4 -3 -2 -1",
              k_square + "f 1 2 -2 +4\r\n",
              std::string("v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 3 4\r\n"),
@@ -214,6 +215,7 @@ TEST_CASE("what is wrong with an OBJ is one sentence with file and line") {
          "a.obj:5: a face has the vertex index 9223372036854775807"},
         {k_square + "f 1 2 -99999999999999999999\n", "a.obj:5: a face has the"},
         {k_square + "f 1 2 x\n", "a.obj:5: \"x\" is not a corner; write a face as"},
+        {k_square + "f 1 2 +-1\n", "a.obj:5: \"+-1\" is not a corner"},
         {k_square + "f 1 2 3.5\n", "a.obj:5: \"3.5\" is not a corner"},
         {k_square + "f 1 2 /3\n", "a.obj:5: \"/3\" is not a corner"},
         {k_square + "f 1/1/1/1 2 3\n", "a.obj:5: \"1/1/1/1\" is not a corner"},

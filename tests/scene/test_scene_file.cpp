@@ -161,6 +161,14 @@ TEST_CASE("to_json and back gives the same scene, to the last bit of every float
             .corner.x));
 }
 
+TEST_CASE(
+    "the float whose shortest decimals, read as a double, end half-way to the next float comes back too") {
+    SceneFile scene;
+    scene.objs = {"a.obj"};
+    scene.units_to_metres = std::bit_cast<float>(0x15ae43fdu);  // 7.038531e-26
+    CHECK(parsed(to_json(scene)).units_to_metres == scene.units_to_metres);
+}
+
 TEST_CASE("to_json writes floats as people do") {
     SceneFile scene;
     scene.objs = {"a.obj"};

@@ -34,7 +34,7 @@ namespace pathscope {
 /// How all materials of a scene are taken.
 enum class MaterialModel {
     frostbite,  ///< As described above; `standard` is the Frostbite standard material.
-    lambert,    ///< Every surface that is no emitter is kd / pi with map_kd and cut-outs; emitters reflect nothing.
+    lambert,  ///< Every surface that is no emitter is kd / pi with map_kd and cut-outs; emitters reflect nothing.
 };
 inline constexpr std::array k_material_model_names{
     EnumName{MaterialModel::frostbite, "frostbite"},
