@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -38,8 +39,9 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 }
 
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes) {
+    static std::atomic<unsigned> writes{0};  // Two threads may write the same file: each has its own part.
     std::filesystem::path part = path;
-    part += fmt::format(".part{}", ::getpid());
+    part += fmt::format(".part{}-{}", ::getpid(), writes.fetch_add(1));
     const auto give_up = [&]() -> Result<void> {
         const std::string why = reason();
         std::error_code ignored;

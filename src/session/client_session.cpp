@@ -114,7 +114,7 @@ Result<void> ClientSession::open_sockets() {
         return Sockets{std::move(*input), std::move(*monitor), std::move(*frames)};
     };
 
-    Result<Sockets> sockets = open(false);
+    Result<Sockets> sockets = open(config_.any_ports);
     const bool may_move = !config_.ports_were_chosen && !config_.listens;
     const bool moved = !sockets && may_move;
     if (moved) sockets = open(true);
@@ -294,7 +294,8 @@ void ClientSession::send(Channel channel, const std::string& instance, Message m
         store_.record(
             {monotonic_now(), 0, k_local_server, 0,
              MessageEvent{left ? MessageWay::sent : MessageWay::dropped, name_of(type), name_of(channel),
-                          peer, bytes, LongText(left ? text : "The peer is not connected, or does not keep up.")}});
+                          peer, bytes,
+                          LongText(left ? text : "The peer is not connected, or does not keep up.")}});
 }
 
 // ---- Joining.
@@ -642,7 +643,6 @@ void ClientSession::on(Server& server, message::Tile& tile) {
     const Commit commit = work_.commit(LightPart::indirect, claim, *sums, now);
     server.speed.add(double(result.samples), render_time);
     store_.add_latency(Latency::tile, commit.since_grant, id);
-    store_.count(Counter::tiles, 1, id);
     count_result(result, id);
     if (const auto offset = server.clock.at(now); offset && store_.keeps_events())
         store_.record({offset->to_client(started), 0, id, 0, SpanEvent{"render", render_time, lease}});
@@ -664,7 +664,8 @@ void ClientSession::on(Server& server, message::Nack& message) {
 }
 
 void ClientSession::count_result(const RoundResult& result, ServerId server) {
-    store_.count_all({{Counter::rays, result.rays},
+    store_.count_all({{Counter::tiles, 1},
+                      {Counter::rays, result.rays},
                       {Counter::samples, result.samples},
                       {Counter::nonfinite_dropped, result.dropped_count}},
                      server);

@@ -59,8 +59,9 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"image_hash", to_hex(figures.image_hash)},
               {"quantum_exponent", state.settings.quantum.exponent},
               {"servers", servers_json(store)},
-              {"client", {{"samples", local ? local->total(Counter::samples) : 0},
-                          {"rays", local ? local->total(Counter::rays) : 0}}}};
+              {"client",
+               {{"samples", local ? local->total(Counter::samples) : 0},
+                {"rays", local ? local->total(Counter::rays) : 0}}}};
     // The counters have one name everywhere; those above have the units that people expect.
     for (const auto& [counter, name] : k_counter_names)
         if (!json.contains(name)) json[std::string(name)] = total(counter);

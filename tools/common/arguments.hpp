@@ -19,7 +19,8 @@ CLI::Option* add_lever(CLI::App& app, const std::string& flag, E& value, const s
     std::vector<std::string> names;
     for (const auto& entry : enum_table(E{})) names.emplace_back(entry.name);
     const auto assign = [&value](const std::string& word) { value = *from_name<E>(word); };
-    return app.add_option_function<std::string>(flag, assign, help + " (" + std::string(name_of(value)) + ")")
+    return app
+        .add_option_function<std::string>(flag, assign, help + " (" + std::string(name_of(value)) + ")")
         ->check(CLI::IsMember(names))
         ->type_name(joined_names<E>());
 }
@@ -32,9 +33,11 @@ inline CLI::Option* add_ports(CLI::App& app, std::array<int, 3>& ports) {
         for (std::size_t i = 0; good && i < ports.size(); ++i)
             good = CLI::detail::lexical_cast(parts[i], ports[i]) && ports[i] >= 1 && ports[i] <= 65535;
         if (!good)
-            throw CLI::ValidationError("--ports", "'" + text + "' is not three ports from 1 to 65535, as in 5555,5556,5557");
+            throw CLI::ValidationError(
+                "--ports", "'" + text + "' is not three ports from 1 to 65535, as in 5555,5556,5557");
     };
-    return app.add_option_function<std::string>("--ports", assign, "input, monitor and frames (5555,5556,5557)")
+    return app
+        .add_option_function<std::string>("--ports", assign, "input, monitor and frames (5555,5556,5557)")
         ->type_name("A,B,C");
 }
 

@@ -13,12 +13,14 @@ namespace {
 std::pair<int, int> parse_size(const std::string& text) {
     const std::size_t cross = text.find('x');
     std::pair<int, int> size;
-    const bool good = cross != std::string::npos && CLI::detail::lexical_cast(text.substr(0, cross), size.first) &&
+    const bool good = cross != std::string::npos &&
+                      CLI::detail::lexical_cast(text.substr(0, cross), size.first) &&
                       CLI::detail::lexical_cast(text.substr(cross + 1), size.second) && size.first >= 1 &&
                       size.second >= 1 && size.first <= k_max_image_side && size.second <= k_max_image_side;
     if (!good)
-        throw CLI::ValidationError("--size", fmt::format("'{}' is not a size from 1x1 to {}x{}, as in 640x360", text,
-                                                         k_max_image_side, k_max_image_side));
+        throw CLI::ValidationError("--size",
+                                   fmt::format("'{}' is not a size from 1x1 to {}x{}, as in 640x360", text,
+                                               k_max_image_side, k_max_image_side));
     return size;
 }
 
@@ -28,7 +30,8 @@ void add_image_options(CLI::App& app, RenderOptions& options) {
         ->required()
         ->allow_extra_args(false)
         ->type_name("FILE");
-    app.add_option("--camera", options.camera, "one of the scene's cameras, by name (the first)")->type_name("NAME");
+    app.add_option("--camera", options.camera, "one of the scene's cameras, by name (the first)")
+        ->type_name("NAME");
     app.add_option_function<std::string>(
            "--size", [&](const std::string& text) { options.size = parse_size(text); }, "pixels")
         ->type_name("WxH");
@@ -126,7 +129,7 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     Setting setting = Setting::best;
     for (int i = 1; i < argc; ++i) {
         const std::string word = argv[i];
-        const std::string value = word.rfind("--setting=", 0) == 0          ? word.substr(10)
+        const std::string value = word.rfind("--setting=", 0) == 0      ? word.substr(10)
                                   : word == "--setting" && i + 1 < argc ? argv[i + 1]
                                                                         : "";
         if (const auto named = from_name<Setting>(value)) setting = *named;
@@ -145,9 +148,10 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (options.client.listens) {
         if (!is_loopback(options.client.host) && !insecure)
-            return bad_input(fmt::format("--listen {}: other machines could reach this address, and nothing is "
-                                         "encrypted or checked. Add --insecure if the network is trusted.",
-                                         options.client.host));
+            return bad_input(
+                fmt::format("--listen {}: other machines could reach this address, and nothing is "
+                            "encrypted or checked. Add --insecure if the network is trusted.",
+                            options.client.host));
         if (app.count("--min-servers") == 0) options.client.min_servers = 1;
     }
     return std::variant<RenderOptions, std::string>(std::move(options));

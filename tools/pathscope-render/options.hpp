@@ -33,9 +33,11 @@ struct RenderOptions {
 };
 
 /// Names for --buffers.
-inline constexpr std::array k_buffer_names{"direct", "indirect", "unfiltered", "albedo", "normal", "depth", "spp"};
+inline constexpr std::array k_buffer_names{"direct", "indirect", "unfiltered", "albedo",
+                                           "normal", "depth",    "spp"};
 
 /// The options; or, for --help and --version, the text to print.
-[[nodiscard]] Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const char* const* argv);
+[[nodiscard]] Result<std::variant<RenderOptions, std::string>> parse_options(int argc,
+                                                                             const char* const* argv);
 
 }  // namespace pathscope

@@ -39,10 +39,12 @@ Result<CameraSpec> choose_camera(const SceneFile& scene, const std::string& name
     if (const CameraSpec* camera = find_camera(scene, name)) return *camera;
     std::string names;
     for (const CameraSpec& camera : scene.cameras) names += (names.empty() ? "" : ", ") + camera.name;
-    return bad_input(fmt::format("--camera {}: the scene has no camera of that name; it has {}.", name, names));
+    return bad_input(
+        fmt::format("--camera {}: the scene has no camera of that name; it has {}.", name, names));
 }
 
-std::pair<int, int> choose_size(const RenderOptions& options, const SceneFile& scene, const CameraSpec& camera) {
+std::pair<int, int> choose_size(const RenderOptions& options, const SceneFile& scene,
+                                const CameraSpec& camera) {
     if (options.size) return *options.size;
     if (const auto& size = scene.defaults.size) return {size->width, size->height};
     const Aspect aspect = camera.aspect.value_or(Aspect{});
@@ -94,8 +96,9 @@ std::vector<ImageLayer> make_layers(const Buffers& buffers, const std::vector<st
 
 bool needs_guides(const RenderState& state, const std::vector<std::string>& buffers) {
     return state.settings.filter == FilterPlace::client ||
-           std::any_of(buffers.begin(), buffers.end(),
-                       [](const auto& name) { return name == "albedo" || name == "normal" || name == "depth"; });
+           std::any_of(buffers.begin(), buffers.end(), [](const auto& name) {
+               return name == "albedo" || name == "normal" || name == "depth";
+           });
 }
 
 ClientConfig complete_config(const RenderOptions& options) {
@@ -110,7 +113,8 @@ Result<void> render(ClientSession& session, const std::atomic<bool>& interrupted
     ProgressLine line;
     const auto& endpoints = session.endpoints();
     if (session.progress().waiting)
-        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST", endpoints[1]));
+        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST",
+                             endpoints[1]));
     while (!session.complete()) {
         session.step(k_longest_step);
         line.show(session.progress());
@@ -136,8 +140,8 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
 
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
-    auto session = ClientSession::create(complete_config(options), {*state, shared_scene, SceneDepot(*opened->files)},
-                                         store);
+    auto session = ClientSession::create(complete_config(options),
+                                         {*state, shared_scene, SceneDepot(*opened->files)}, store);
     if (!session) return session.error();
     if (const auto done = render(**session, interrupted); !done) return done;
     const TimeNs rendered = monotonic_now();
@@ -149,7 +153,8 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     if (needs_guides(*state, options.buffers))
         buffers.guides = render_guides(*shared_scene, state->camera, settings,
                                        {0, 0, settings.width, settings.height}, options.client.threads);
-    buffers.frame = compose_frame(work.direct(), work.indirect(), settings, buffers.guides, options.client.threads);
+    buffers.frame =
+        compose_frame(work.direct(), work.indirect(), settings, buffers.guides, options.client.threads);
     buffers.samples = settings.spp > 0 ? work.indirect().samples() : work.direct().samples();
     SaveOptions save;
     save.tone_map.exposure_ev = options.exposure_ev.value_or(opened->file.exposure_ev);

@@ -20,19 +20,22 @@ int main(int argc, char** argv) {
     ServerConfig config;
     config.cache_folder = SceneCache::default_folder();
     bool quiet = false;
-    CLI::App app("Renders indirect light for a client; goes on trying until told to stop (Ctrl+C).", "pathscope-server");
+    CLI::App app("Renders indirect light for a client; goes on trying until told to stop (Ctrl+C).",
+                 "pathscope-server");
     app.add_option("--connect", config.host, "host of the client (127.0.0.1)")->type_name("HOST");
     add_ports(app, config.ports);
     app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
         ->check(CLI::Range(0, 1024))
         ->type_name("N");
-    app.add_option("--speed-cap", config.samples_per_second, "render no faster, in samples per second; 0 = no cap (0)")
+    app.add_option("--speed-cap", config.samples_per_second,
+                   "render no faster, in samples per second; 0 = no cap (0)")
         ->check(CLI::Range(0.0, 1e12))
         ->type_name("N");
     app.add_option("--name", config.name, "for people (host name and process id)")
         ->check(CLI::Validator(
             [](const std::string& name) {
-                return name.empty() || name.size() > 64 ? std::string("a name has 1 to 64 bytes") : std::string();
+                return name.empty() || name.size() > 64 ? std::string("a name has 1 to 64 bytes")
+                                                        : std::string();
             },
             "NAME"))
         ->type_name("NAME");

@@ -18,6 +18,7 @@ inline constexpr std::array k_default_ports{5555, 5556, 5557};  ///< input, moni
 struct ClientConfig {
     std::string host = "127.0.0.1";  ///< Address to bind to.
     std::array<int, 3> ports = k_default_ports;
+    bool any_ports = false;  ///< Take whichever ports are free; endpoints() tells which.
     bool ports_were_chosen =
         false;  ///< By the user: then a port in use is an error. Else free ones are taken and named.
     bool listens = false;  ///< Sockets are opened even when no local server is asked for.

@@ -25,6 +25,7 @@ struct RunFigures {
     std::vector<DroppedSample> dropped;  ///< Some of those counted as nonfinite_dropped.
 };
 
-[[nodiscard]] std::string stats_json(const RenderState& state, const EventStore& store, const RunFigures& figures);
+[[nodiscard]] std::string stats_json(const RenderState& state, const EventStore& store,
+                                     const RunFigures& figures);
 
 }  // namespace pathscope

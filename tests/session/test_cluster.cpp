@@ -1,0 +1,300 @@
+/// Client and servers over real sockets on loopback, in one process: whatever happens, the image has the same bits as
+/// the render of one machine.
+
+#include <atomic>
+#include <functional>
+#include <thread>
+
+#include "pathscope/image/image_hash.hpp"
+#include "pathscope/net/dealer.hpp"
+#include "pathscope/net/poller.hpp"
+#include "pathscope/render/rendered_frame.hpp"
+#include "pathscope/session/build_identity.hpp"
+#include "pathscope/session/client_session.hpp"
+#include "pathscope/session/server_session.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+using namespace pathscope::testing;
+
+namespace {
+
+constexpr TimeNs k_patience = 120 * k_second_ns;  ///< A test that waits longer has failed.
+
+/// Our Cornell box in a few pixels.
+struct SmallJob {
+    OpenedScene opened;
+    std::shared_ptr<const Scene> scene;
+    RenderState state;
+
+    explicit SmallJob(std::uint32_t spp = 8) : opened(*open_scene("scenes/cornell/scene.json", {})) {
+        scene = std::make_shared<const Scene>(*make_scene(opened.file, opened.parts, 1));
+        state.scene = opened.file;
+        state.camera = opened.file.cameras.front().view;
+        state.settings.width = 70;
+        state.settings.height = 40;
+        state.settings.spp = spp;
+        state.settings.direct_spp = 2;
+        state.settings.seed = 7;
+        state.settings.quantum = quantum_for(scene->typical_radiance, scene->brightest_radiance);
+    }
+    [[nodiscard]] ClientJob job() const { return {state, scene, SceneDepot(*opened.files)}; }
+
+    /// What every distributed image must equal.
+    [[nodiscard]] Digest hash_of_one_machine(const RenderState& wanted) const {
+        const LocalRender local = render_locally(*scene, wanted.camera, wanted.settings, 64, 1);
+        return image_hash(compose_frame(local.direct, local.indirect, wanted.settings, {}, 1).combined);
+    }
+    [[nodiscard]] Digest hash_of_one_machine() const { return hash_of_one_machine(state); }
+};
+
+ClientConfig listening(int min_servers) {
+    ClientConfig config;
+    config.ports = {0, 0, 0};
+    config.any_ports = true;
+    config.listens = true;
+    config.min_servers = min_servers;
+    config.threads = 1;
+    config.block_size = 16;
+    config.round_samples = 2;
+    return config;
+}
+
+std::array<int, 3> ports_of(const ClientSession& client) {
+    std::array<int, 3> ports;
+    for (std::size_t i = 0; i < ports.size(); ++i)
+        ports[i] = std::stoi(client.endpoints()[i].substr(client.endpoints()[i].rfind(':') + 1));
+    return ports;
+}
+
+/// A server on a thread of its own; it is told to stop at the end of the scope.
+class RunningServer {
+  public:
+    RunningServer(std::array<int, 3> ports, const std::filesystem::path& cache,
+                  double samples_per_second = 0) {
+        ServerConfig config;
+        config.ports = ports;
+        config.name = "test";
+        config.threads = 1;
+        config.cache_folder = cache;
+        config.samples_per_second = samples_per_second;
+        session_ = std::move(*ServerSession::create(config));
+        thread_ = std::thread([this] { result_ = session_->run(); });
+    }
+    ~RunningServer() {
+        stop();
+        thread_.join();
+    }
+    void stop() { session_->request_stop(); }
+    [[nodiscard]] Result<void> wait() {
+        thread_.join();
+        thread_ = std::thread([] {});
+        return result_;
+    }
+
+  private:
+    std::unique_ptr<ServerSession> session_;
+    std::thread thread_;
+    Result<void> result_;
+};
+
+/// Steps the client until `done`; false when patience ends.
+bool step_until(ClientSession& client, const std::function<bool()>& done) {
+    const TimeNs limit = monotonic_now() + k_patience;
+    while (!done()) {
+        if (monotonic_now() > limit) return false;
+        client.step(50 * k_millisecond_ns);
+    }
+    return true;
+}
+
+bool finish(ClientSession& client) {
+    return step_until(client, [&] { return client.complete(); });
+}
+
+Digest hash_of(const ClientSession& client) {
+    const FrameWork& work = client.work();
+    return image_hash(compose_frame(work.direct(), work.indirect(), client.state().settings, {}, 1).combined);
+}
+
+}  // namespace
+
+TEST_CASE("the image has the same bits for any number of servers, schedule, block and round size") {
+    const SmallJob small;
+    const Digest expected = small.hash_of_one_machine();
+    const TemporaryFolder cache;  // Empty at first: the scene travels over the wire.
+    struct Case {
+        int servers, block, round;
+        ScheduleKind schedule;
+    };
+    for (const Case& c :
+         {Case{0, 32, 4, ScheduleKind::pull}, Case{1, 32, 4, ScheduleKind::pull},
+          Case{2, 16, 3, ScheduleKind::static_shares}, Case{3, 7, 1, ScheduleKind::weighted_shares}}) {
+        CAPTURE(c.servers);
+        EventStore store;
+        ClientConfig config = listening(c.servers);
+        config.block_size = c.block;
+        config.round_samples = std::uint32_t(c.round);
+        config.schedule = c.schedule;
+        const auto client = std::move(*ClientSession::create(config, small.job(), store));
+        std::vector<std::unique_ptr<RunningServer>> servers;
+        for (int i = 0; i < c.servers; ++i)
+            servers.push_back(std::make_unique<RunningServer>(ports_of(*client), cache.path()));
+        REQUIRE(finish(*client));
+        CHECK(hash_of(*client) == expected);
+        CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
+        CHECK(bool(client->work().indirect_ledger().audit()));
+        CHECK(store.servers().size() == std::size_t(c.servers) + 1);
+        if (c.servers > 0) CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
+    }
+}
+
+TEST_CASE("a server that leaves in mid-frame gives its rounds to the others, one that comes late joins in") {
+    const SmallJob small(64);
+    const TemporaryFolder cache;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+    // Slow, so that it is sure to be in mid-frame when it is told to leave.
+    auto first = std::make_unique<RunningServer>(ports_of(*client), cache.path(), 20'000);
+    REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.05; }));
+    first->stop();
+    const RunningServer second(ports_of(*client), cache.path());
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
+}
+
+TEST_CASE("when the last server leaves in mid-frame, the client carries on alone") {
+    const SmallJob small(32);
+    const TemporaryFolder cache;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+    RunningServer server(ports_of(*client), cache.path(), 20'000);
+    REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.05; }));
+    server.stop();
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(store.server(k_local_server)->total(Counter::rounds_committed) > 0);
+    CHECK(store.server(ServerId{1})->total(Counter::rounds_committed) > 0);
+}
+
+TEST_CASE("an input in mid-frame reaches the servers, and no result of the old epoch reaches the image") {
+    const SmallJob small(64);
+    const TemporaryFolder cache;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(2), small.job(), store));
+    const RunningServer a(ports_of(*client), cache.path()), b(ports_of(*client), cache.path());
+    RenderState state = small.state;
+    for (int move = 1; move <= 3; ++move) {
+        REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.1; }));
+        state.camera.position.x += 30;
+        state.settings.seed = std::uint32_t(move);
+        client->change_state(state);
+        CHECK(client->epoch() == Epoch{std::uint32_t(move + 1)});
+    }
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine(state));
+    CHECK(bool(client->work().indirect_ledger().audit()));
+    CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
+}
+
+TEST_CASE("a server that loses its client waits for the next one, and serves it") {
+    const SmallJob small;
+    const TemporaryFolder cache;
+    EventStore first_store, second_store;
+    auto client = std::move(*ClientSession::create(listening(1), small.job(), first_store));
+    ClientConfig again = listening(1);
+    again.ports = ports_of(*client);
+    again.any_ports = false;
+    const RunningServer server(again.ports, cache.path());
+    REQUIRE(finish(*client));
+    client.reset();
+    client = std::move(*ClientSession::create(again, small.job(), second_store));
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(second_store.server(ServerId{1})->total(Counter::rounds_committed) > 0);
+}
+
+TEST_CASE("garbage, foreign versions and unknown peers are dropped and counted, and the image is the same") {
+    const SmallJob small(32);
+    const TemporaryFolder cache;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+    const std::array<int, 3> ports = ports_of(*client);
+
+    const Context context;
+    const auto dial = [&](int port) {
+        return std::move(
+            *DealerSocket::connect(context, "tcp://127.0.0.1:" + std::to_string(port), random_routing_id()));
+    };
+    DealerSocket monitor = dial(ports[1]), frames = dial(ports[2]);
+    const auto send = [&](DealerSocket& socket, Frames message) {
+        REQUIRE(step_until(*client, [&] { return socket.send(Frames(message)) == SendOutcome::delivered; }));
+    };
+    HashRng rng(1);
+    for (int i = 0; i < 200; ++i) {
+        Frames message(1 + rng.next_u32() % 4);
+        for (std::string& frame : message)
+            for (std::uint32_t n = rng.next_u32() % 40; n > 0; --n) frame += char(rng.next_u32());
+        send(i % 2 ? monitor : frames, message);
+    }
+    // A result from somebody who never said HELLO, and a HELLO of another protocol.
+    message::Tile tile;
+    tile.session = 1;
+    tile.lease = LeaseId{1};
+    tile.strategy = "blocks";
+    tile.count = 2;
+    tile.codec = "raw";
+    send(frames, encode(tile));
+    Frames foreign = encode(message::Hello{std::string(16, 'x'), "n", "v", build_identity(), 1, 0});
+    foreign[0][2] = 99;
+    send(monitor, foreign);
+    std::optional<Frames> answer;
+    Decoded reject = DecodeError{};
+    REQUIRE(step_until(*client, [&] {
+        answer = monitor.receive();
+        if (!answer) return false;
+        reject = decode(std::move(*answer), Role::server, Channel::monitor);
+        return reject && std::holds_alternative<message::Reject>(*reject);
+    }));
+    CHECK(std::get<message::Reject>(*reject).code == RejectCode::version);
+
+    const RunningServer server(ports, cache.path());
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(store.total(Counter::bad_messages) >= 202);
+}
+
+TEST_CASE("a server of another build is refused, and says why") {
+    const SmallJob small;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+    const Context context;
+    const std::string id = random_routing_id();
+    DealerSocket monitor = std::move(
+        *DealerSocket::connect(context, "tcp://127.0.0.1:" + std::to_string(ports_of(*client)[1]), id));
+    REQUIRE(step_until(*client, [&] {
+        return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0})) ==
+               SendOutcome::delivered;
+    }));
+    std::optional<Frames> answer;
+    REQUIRE(step_until(*client, [&] { return (answer = monitor.receive()).has_value(); }));
+    Decoded reject = decode(std::move(*answer), Role::server, Channel::monitor);
+    REQUIRE(bool(reject));
+    CHECK(std::get<message::Reject>(*reject).code == RejectCode::build);
+    CHECK(client->progress().servers_known == 0);
+}
+
+TEST_CASE("a port in use is a sentence that names it") {
+    const SmallJob small;
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(0), small.job(), store));
+    ClientConfig config = listening(0);
+    config.ports = ports_of(*client);
+    config.any_ports = false;
+    config.ports_were_chosen = true;
+    const auto second = ClientSession::create(config, small.job(), store);
+    REQUIRE_FALSE(bool(second));
+    CHECK(second.error().message.find(std::to_string(config.ports[0])) != std::string::npos);
+}
