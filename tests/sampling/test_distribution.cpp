@@ -113,13 +113,25 @@ TEST_CASE("a picture of weights: points fall by weight, uniformly within a pixel
     CHECK(chi_square_test(observed, expected).p_value > sidak_threshold(k_significance, 2));
 }
 
-TEST_CASE("points at the edges of the square stay in the pixel they were picked in") {
-    std::vector<float> weights(49, 0.0f);
-    for (std::size_t i = 0; i < 49; i += 2) weights[i] = float(i + 1);
-    const auto distribution = Distribution2d::make(weights, 49, 1);
-    for (int i = 0; i < 1 << 16; ++i) {
-        const float u = i == 0 ? k_one_minus_epsilon : float(i) * 0x1p-16f;
-        const Distribution2d::Pick pick = distribution->sample({u, k_one_minus_epsilon});
-        REQUIRE(pick.pdf_square == distribution->pdf_square(pick.point));
+TEST_CASE("points at the edges of pixels stay in the pixel they were picked in") {
+    // Weights that differ from neighbour to neighbour, so that a point on the wrong side has another density.
+    const int width = 49;
+    std::vector<float> weights(width);
+    for (int i = 0; i < width; ++i) weights[std::size_t(i)] = float(1 + i % 3);
+    const auto distribution = Distribution2d::make(weights, width, 1);
+    const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
+    double sum = 0;
+    for (int i = 0; i <= width; ++i) {
+        for (int step = -30; step <= 30; ++step) {
+            const double u = std::floor(sum / total * 0x1p24 + step) * 0x1p-24;
+            if (u < 0 || u >= 1) continue;
+            for (const float v : {0.0f, k_one_minus_epsilon}) {
+                const Distribution2d::Pick pick = distribution->sample({float(u), v});
+                REQUIRE(pick.point.x < 1);
+                REQUIRE(pick.point.y < 1);
+                REQUIRE(pick.pdf_square == distribution->pdf_square(pick.point));
+            }
+        }
+        if (i < width) sum += weights[std::size_t(i)];
     }
 }

@@ -171,6 +171,28 @@ TEST_CASE("correlation of pairs is that of chance at small sample counts too") {
     }
 }
 
+TEST_CASE("each pixel errs on its own: over many pixels, the means of eight samples average to the answer") {
+    // Were neither the order nor the scramble a pixel's own, all pixels would share one error.
+    for (const SamplerKind kind : k_kinds) {
+        Moments first, second;
+        for (int pixel = 0; pixel < 4096; ++pixel) {
+            double x2 = 0, y2 = 0;
+            for (std::uint32_t s = 0; s < 8; ++s) {
+                const Vec2 u = PixelSampler(kind, 3, pixel % 64, pixel / 64, s).get_2d(1);
+                x2 += u.x * u.x / 8;
+                y2 += u.y * u.y / 8;
+            }
+            first.add(x2);
+            second.add(y2);
+        }
+        for (const Moments& mean : {first, second}) {
+            REQUIRE(mean.standard_error() > 0);
+            CHECK(normal_two_sided_p((mean.mean() - 1.0 / 3) / mean.standard_error()) >
+                  sidak_threshold(k_significance, 4));
+        }
+    }
+}
+
 TEST_CASE("sobol beats independent on a smooth integrand: variance at 256 samples is below 1/1000") {
     // The integral of x e^(x y) over the square is e - 2. Independent: variance 0.27 / n.
     const double answer = std::exp(1.0) - 2;

@@ -154,6 +154,24 @@ TEST_CASE(
     CHECK(largest < 4.14f);
 }
 
+TEST_CASE(
+    "lobes are picked by what they reflect: weights of plastic vary by a quarter, where even odds give "
+    "half") {
+    for (const float roughness : {0.2f, 0.4f, 0.7f, 1.0f}) {
+        const Bsdf bsdf = standard({0.5f, 0.5f, 0.5f}, {0.04f, 0.04f, 0.04f}, roughness);
+        HashRng rng(1);
+        Moments weight;
+        for (int i = 0; i < 50'000; ++i) {
+            const Vec3 o = direction_at(std::max(0.01f, rng.next_float()), rng.next_float());
+            const float u_lobe = rng.next_float();
+            const auto sample = sample_bsdf(bsdf, o, u_lobe, next_2d(rng));
+            weight.add(sample ? sample->weight.x : 0);
+        }
+        CAPTURE(roughness);
+        CHECK(std::sqrt(weight.variance()) / weight.mean() < 0.27);
+    }
+}
+
 TEST_CASE("delta lobes: no value, no density, the same sample under each lever") {
     HashRng rng(5);
     for (const Bsdf& bsdf : delta_surfaces())
