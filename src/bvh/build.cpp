@@ -55,6 +55,7 @@ std::size_t split(Builder& builder, const OpenNode& open, const RangeBounds& bou
 
 /// Writes the node's box, and its place if it is a leaf; for an inner node, returns the size of its left part.
 std::size_t close_node(Builder& builder, const OpenNode& open, BvhNode& node) {
+    CHECK(open.depth <= k_bvh_max_depth, open.depth);  // the traversal's stack relies on it
     const RangeBounds bounds = range_bounds(builder.range_of(open));
     const std::size_t left = split(builder, open, bounds);
     node = make_node(bounds.boxes, static_cast<std::uint32_t>(open.begin),

@@ -39,11 +39,11 @@ struct Replay : NullTraversalProbe {
         surprises += t_near <= t_closest;
         pop(node);
     }
-    void test_triangle(std::uint32_t triangle, TriangleOutcome outcome, float t) {
+    void test_triangle(std::uint32_t triangle, TriangleOutcome outcome, float t_max) {
         leaf_triangles.push_back(triangle);
         if (outcome != TriangleOutcome::closest) return;
-        surprises += t > t_closest;
-        t_closest = t;
+        surprises += t_max > t_closest;
+        t_closest = t_max;
         closest = triangle;
     }
 
@@ -102,7 +102,7 @@ TEST_CASE("outcomes: rejected hits, ties and misses are told apart") {
     CHECK(closest.count[static_cast<int>(TriangleOutcome::missed)] == 3);
     CHECK(closest.count[static_cast<int>(TriangleOutcome::rejected)] == 1);
     CHECK(closest.count[static_cast<int>(TriangleOutcome::closest)] == 1);
-    CHECK(closest.count[static_cast<int>(TriangleOutcome::farther)] == 1);
+    CHECK(closest.count[static_cast<int>(TriangleOutcome::tied)] == 1);
     CHECK(any_hit(bvh, ray, not_the_first, any));
     CHECK(any.count[static_cast<int>(TriangleOutcome::closest)] == 1);
 }

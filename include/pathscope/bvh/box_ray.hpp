@@ -10,8 +10,8 @@
 /// - Rounding. Each t is off by three roundings, up to 3 * 2^-24 of itself: a ray through an edge of the box, or
 ///   along a face of a flat one, can fall between near and far. So far is stretched by 1 + 2^-21.
 /// - The triangle test (geometry/triangle.hpp) has an error of its own, about 2^-50 of the distances, by which a hit
-///   may stick out of its box. So the origin is moved towards the box on each side: back for near planes, ahead for
-///   far ones, by 2^-48 of the scene plus an ulp of the origin.
+///   may stick out of its box. So the origin is moved, towards the near planes for t_near and away from the far ones
+///   for t_far, by 2^-48 of the scene and a few ulps of its own, lest the sum be rounded back.
 /// - Division by zero. A direction component of 0 gives 0 * infinity = NaN where the origin is on a plane. So its
 ///   inverse is the largest float instead of infinity; with the moved origin no product is 0.
 ///
@@ -23,6 +23,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
 
 #include "pathscope/math/box.hpp"
 #include "pathscope/math/ray.hpp"

@@ -18,8 +18,8 @@
 namespace pathscope {
 
 enum class TriangleOutcome {
-    missed,    ///< The ray passes by, or the hit is outside of [t_min, t_max].
-    farther,   ///< A hit, but not before the closest one so far.
+    missed,    ///< The ray passes by, or its interval (which ends at the closest hit so far) does not reach.
+    tied,      ///< A hit at the same t as the closest one, which has the lower number.
     rejected,  ///< A hit that `accept` turned down: the hole of a cut-out.
     closest,   ///< The closest so far; the only one, for any_hit.
 };
@@ -33,7 +33,8 @@ struct NullTraversalProbe {
     void postpone_node(std::uint32_t /*node*/, float /*t_near*/) {}
     /// Taken from the stack, but a closer hit has been found since.
     void drop_node(std::uint32_t /*node*/, float /*t_near*/) {}
-    void test_triangle(std::uint32_t /*triangle*/, TriangleOutcome /*outcome*/, float /*t*/) {}
+    /// t_max: where the ray ends after this test.
+    void test_triangle(std::uint32_t /*triangle*/, TriangleOutcome /*outcome*/, float /*t_max*/) {}
 };
 
 struct TraversalCounts : NullTraversalProbe {
@@ -41,7 +42,9 @@ struct TraversalCounts : NullTraversalProbe {
 
     void enter_node(std::uint32_t /*node*/) { ++nodes; }
     void test_box(std::uint32_t /*node*/, float /*t_near*/, bool /*met*/) { ++boxes; }
-    void test_triangle(std::uint32_t /*triangle*/, TriangleOutcome /*outcome*/, float /*t*/) { ++triangles; }
+    void test_triangle(std::uint32_t /*triangle*/, TriangleOutcome /*outcome*/, float /*t_max*/) {
+        ++triangles;
+    }
 };
 
 }  // namespace pathscope

@@ -20,12 +20,10 @@
 
 #include <cstdint>
 #include <optional>
-#include <utility>
 
 #include "pathscope/bvh/box_ray.hpp"
 #include "pathscope/bvh/bvh.hpp"
 #include "pathscope/bvh/traversal_probe.hpp"
-#include "pathscope/core/check.hpp"
 #include "pathscope/geometry/hit.hpp"
 #include "pathscope/geometry/triangle.hpp"
 
@@ -40,16 +38,24 @@ namespace detail {
 /// Nodes that wait for their turn. One per level at most, so k_bvh_max_depth of them suffice.
 class TraversalStack {
   public:
+    void push(std::uint32_t node, float t_near) { entries_[size_++] = {node, t_near}; }
+
+    /// The next node that begins before t_max; nothing if there is none left.
+    template <class Probe>
+    [[nodiscard]] std::optional<std::uint32_t> pop(float t_max, Probe& probe) {
+        while (size_ > 0) {
+            const auto [node, t_near] = entries_[--size_];
+            if (t_near <= t_max * k_far_stretch) return node;
+            probe.drop_node(node, t_near);
+        }
+        return std::nullopt;
+    }
+
+  private:
     struct Entry {
         std::uint32_t node;
         float t_near;
     };
-
-    [[nodiscard]] bool empty() const { return size_ == 0; }
-    void push(Entry entry) { entries_[size_++] = entry; }
-    Entry pop() { return entries_[--size_]; }
-
-  private:
     int size_ = 0;
     Entry entries_[k_bvh_max_depth];
 };
@@ -66,39 +72,30 @@ void walk(const Bvh& bvh, const Ray& ray, const float& t_max, OpenLeaf&& open_le
         return interval;
     };
 
-    if (!test_box(0).met()) return;
     TraversalStack stack;
-    std::uint32_t current = 0;
-    for (;;) {
-        probe.enter_node(current);
-        const BvhNode& node = bvh.node(current);
-        if (!node.is_leaf()) {
-            const BoxInterval left = test_box(node.first);
-            const BoxInterval right = test_box(node.first + 1);
-            if (left.met() && right.met()) {
-                const bool right_first = right.t_near < left.t_near;
-                const std::uint32_t farther = node.first + (right_first ? 0 : 1);
-                const float t_farther = right_first ? left.t_near : right.t_near;
-                probe.postpone_node(farther, t_farther);
-                stack.push({farther, t_farther});
-                current = node.first + (right_first ? 1 : 0);
-                continue;
-            }
-            if (left.met() || right.met()) {
-                current = node.first + (left.met() ? 0 : 1);
-                continue;
-            }
-        } else if (open_leaf(node)) {
-            return;
+    std::optional<std::uint32_t> current;
+    if (test_box(0).met()) current = 0;
+    while (current) {
+        probe.enter_node(*current);
+        const BvhNode& node = bvh.node(*current);
+        if (node.is_leaf()) {
+            if (open_leaf(node)) return;
+            current = stack.pop(t_max, probe);
+            continue;
         }
-        for (;;) {
-            if (stack.empty()) return;
-            const auto [postponed, t_near] = stack.pop();
-            if (t_near <= t_max * k_far_stretch) {
-                current = postponed;
-                break;
-            }
-            probe.drop_node(postponed, t_near);
+        const std::uint32_t left = node.first, right = node.first + 1;
+        const BoxInterval in_left = test_box(left), in_right = test_box(right);
+        if (in_left.met() && in_right.met()) {
+            const bool left_first = in_left.t_near <= in_right.t_near;
+            const std::uint32_t farther = left_first ? right : left;
+            const float t_farther = left_first ? in_right.t_near : in_left.t_near;
+            probe.postpone_node(farther, t_farther);
+            stack.push(farther, t_farther);
+            current = left_first ? left : right;
+        } else if (in_left.met() || in_right.met()) {
+            current = in_left.met() ? left : right;
+        } else {
+            current = stack.pop(t_max, probe);
         }
     }
 }
@@ -113,7 +110,7 @@ template <class Accept, class Probe>
     const auto test = [&](const LeafTriangle& leaf) {
         const auto hit = intersect_triangle(triangle_ray, leaf.a, leaf.b, leaf.c, best.t);
         if (!hit) return TriangleOutcome::missed;
-        if (found && hit->t == best.t && leaf.triangle > best.triangle) return TriangleOutcome::farther;
+        if (found && hit->t == best.t && leaf.triangle > best.triangle) return TriangleOutcome::tied;
         if (!accept(leaf.triangle, hit->u, hit->v)) return TriangleOutcome::rejected;
         best = {hit->t, hit->u, hit->v, leaf.triangle};
         found = true;
@@ -139,11 +136,10 @@ template <class Accept, class Probe>
             const LeafTriangle& leaf = bvh.triangles[i];
             const auto hit = intersect_triangle(triangle_ray, leaf.a, leaf.b, leaf.c, ray.t_max);
             found = hit && accept(leaf.triangle, hit->u, hit->v);
-            probe.test_triangle(leaf.triangle,
-                                found ? TriangleOutcome::closest
-                                : hit ? TriangleOutcome::rejected
-                                      : TriangleOutcome::missed,
-                                hit ? hit->t : ray.t_max);
+            const auto outcome = found ? TriangleOutcome::closest
+                                 : hit ? TriangleOutcome::rejected
+                                       : TriangleOutcome::missed;
+            probe.test_triangle(leaf.triangle, outcome, found ? hit->t : ray.t_max);
         }
         return found;
     };
