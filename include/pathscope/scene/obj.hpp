@@ -7,11 +7,10 @@
 /// (triangulate.hpp), whose triangles add up to the polygon. Corners that share position, normal and uv share
 /// a vertex.
 ///
-/// Normals. Given ones are used as they stand; zero or missing ones become the zero vector, which means
-/// "flat" (the triangle's own normal). Where a file gives none at all and smoothing is on, a vertex of
-/// smoothing group g > 0 gets the mean of the normals of the faces of that group at its position, each
-/// weighted by its angle there; that does not depend on how faces were cut into triangles. Group 0 or off,
-/// where every file starts, is flat.
+/// Normals. Given ones are used as they stand; zero ones, and such that are not finite, mean "flat" (the
+/// triangle's own normal). Where a face gives none and smoothing is on, its corners get the mean of the normals
+/// of all faces of its smoothing group g > 0 at that position, each weighted by its angle there; that does not
+/// depend on how faces were cut into triangles. Group 0 or off, where every file starts, is flat.
 ///
 /// Reference: Thürmer & Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
 ///
