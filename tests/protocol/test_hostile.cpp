@@ -81,10 +81,10 @@ std::vector<PackValue> forbidden_values(const FieldInfo& field) {
     } else if (field.type == "u64[]") {
         bad.insert(bad.end(), {7, PackArray(most + 1, PackValue(1)), PackArray{-1}, PackArray{"1"}});
     } else if (field.type == "sample[]") {
-        bad.insert(bad.end(),
-                   {7, PackArray(most + 1, PackValue(PackArray{1, 1, 1})), PackArray{PackArray{1, 1}},
-                    PackArray{PackArray{65536, 0, 0}}, PackArray{PackArray{0, 65536, 0}},
-                    PackArray{PackArray{0, 0, std::uint64_t{1} << 32}}, PackArray{7}});
+        bad.insert(bad.end(), {7, PackArray(most + 1, PackValue(PackArray{1, 1, 1})),
+                               PackArray{PackArray{1, 1}}, PackArray{PackArray{1, 1, 1, 1}},
+                               PackArray{PackArray{65536, 0, 0}}, PackArray{PackArray{0, 65536, 0}},
+                               PackArray{PackArray{0, 0, std::uint64_t{1} << 32}}, PackArray{7}});
     } else {
         FAIL("no forbidden values for fields of type " << field.type);
     }

@@ -87,13 +87,17 @@ TEST_CASE("another size than expected is refused, and bombs before they unpack")
     const std::string bomb = frame_of(std::string(64 << 20, '\0'));
     REQUIRE(bomb.size() < 8192);
     for (const std::size_t expected : {std::size_t{24}, std::size_t{24'576}}) {
-        CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, bomb, expected)));
+        const auto refused = unpack_bytes(Codec::shuffle_zstd, bomb, expected);
+        REQUIRE_FALSE(bool(refused));
+        CHECK(refused.error().message.find("does not state") != std::string::npos);
         CHECK_FALSE(bool(unpack_bytes(Codec::raw, bomb, expected)));
     }
-    // One frame too many, and one that claims less than it holds.
+    // One frame too many, an empty "skippable" one behind it, and one that claims less or more than it holds.
     const std::string good = frame_of(std::string(800, 'x'));
     REQUIRE(bool(unpack_bytes(Codec::shuffle_zstd, good, 800)));
     CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, good + good, 800)));
+    const std::string skippable("\x50\x2A\x4D\x18\0\0\0\0", 8);
+    CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, good + skippable, 800)));
     CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, good, 792)));
     CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, good, 801)));
     CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, "", 800)));
