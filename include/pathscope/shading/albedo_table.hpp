@@ -7,8 +7,8 @@
 /// Why: the standard material must know what its specular coat takes before it lets the base have the rest,
 /// and which lobe is worth a sample. Frostbite keeps the very same three numbers in a texture for its
 /// image-based lights ("pre-integrated DFG").
-/// Interpolated bilinearly over 32 x 32 nodes; made on first use, in about 40 ms, from sums and square roots
-/// only, so with the same bits everywhere. Error: below 0.004 (see the test).
+/// Interpolated bilinearly over 32 x 32 nodes; made on first use, in some 50 ms, from sums, products and square
+/// roots only, so with the same bits everywhere. Error: below 0.012, and 0.003 in the mean.
 /// See: Lagarde & de Rousiers 2014, "Moving Frostbite to PBR", 4.9.2; Karis 2013, "Real Shading in Unreal
 ///      Engine 4".
 /// Thread safety: yes.   Test: tests/shading/test_energy.cpp
