@@ -1,0 +1,139 @@
+"""Real processes, real faults: a client and three render servers on this machine, of which some are killed, frozen or
+come late. Whatever happens, the image has the same bits as the render without servers, and every round counts once.
+
+    test_faults.py BIN      BIN: the folder of pathscope-render and pathscope-server
+"""
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+SCENE = "scenes/cornell/scene.json"
+JOB = ["--size", "200x150", "--spp", "96", "--direct-spp", "8", "--seed", "7"]
+PATIENCE_S = 300  # A run that takes longer has failed.
+
+
+class Run:
+    """One pathscope-render, its server processes and its statistics."""
+
+    def __init__(self, folder, *options):
+        self.stats_file = pathlib.Path(folder) / "stats.json"
+        self.stats_file.unlink(missing_ok=True)
+        command = [BIN / "pathscope-render", SCENE, "-o", pathlib.Path(folder) / "image.pfm", "--stats",
+                   self.stats_file, *JOB, *options]
+        environment = dict(os.environ, XDG_CACHE_HOME=str(folder))
+        self.process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+
+    def servers(self):
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        return [int(pid) for pid in children.read_text().split()]
+
+    def working_servers(self, count):
+        """Waits until so many servers are at work: their own CPU time says so, the scene loads in no time."""
+        limit = time.monotonic() + PATIENCE_S
+        while time.monotonic() < limit and self.process.poll() is None:
+            busy = [pid for pid in self.servers() if cpu_seconds(pid) > 0.4]
+            if len(busy) >= count:
+                return busy
+            time.sleep(0.005)
+        raise AssertionError("the servers did not get to work: " + self.finish_text())
+
+    def finish_text(self):
+        return self.process.communicate(timeout=PATIENCE_S)[1]
+
+    def finish(self):
+        text = self.finish_text()
+        if self.process.returncode != 0:
+            raise AssertionError(f"exit code {self.process.returncode}: {text}")
+        return json.loads(self.stats_file.read_text())
+
+
+def cpu_seconds(pid):
+    try:
+        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class Faults(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = cls.temporary.name
+        cls.expected = Run(cls.folder, "--servers", "0").finish()["image_hash"]
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def check(self, stats, died):
+        self.assertEqual(stats["image_hash"], self.expected)
+        self.assertEqual(stats["rounds"], stats["rounds_committed"])
+        self.assertEqual(stats["bad_messages"], 0)
+        self.assertEqual(sum(server["died"] for server in stats["servers"]), died, stats["servers"])
+
+    def test_three_servers_without_a_fault(self):
+        stats = Run(self.folder, "--servers", "3").finish()
+        self.check(stats, died=0)
+        self.assertEqual(stats["client"]["samples"], 200 * 150 * 8)  # Direct light alone.
+
+    def test_static_schedule_and_small_blocks(self):
+        self.check(Run(self.folder, "--servers", "2", "--schedule", "static", "--block", "16").finish(), died=0)
+
+    def test_kill_9(self):
+        run = Run(self.folder, "--servers", "3")
+        os.kill(run.working_servers(3)[0], signal.SIGKILL)
+        stats = run.finish()
+        self.check(stats, died=1)
+        self.assertGreaterEqual(stats["reallocated"], 1)
+
+    def test_frozen(self):
+        run = Run(self.folder, "--servers", "3")
+        frozen = run.working_servers(3)[0]
+        os.kill(frozen, signal.SIGSTOP)
+        stats = run.finish()
+        self.check(stats, died=1)
+        self.assertFalse(pathlib.Path(f"/proc/{frozen}").exists(), "the frozen server was left behind")
+
+    def test_all_killed(self):
+        run = Run(self.folder, "--servers", "3")
+        for pid in run.working_servers(3):
+            os.kill(pid, signal.SIGKILL)
+        stats = run.finish()
+        self.check(stats, died=3)
+        self.assertGreater(stats["client"]["samples"], 200 * 150 * 8)
+
+    def test_client_killed_leaves_no_server(self):
+        run = Run(self.folder, "--servers", "3")
+        servers = run.working_servers(3)
+        run.process.kill()
+        run.process.communicate()
+        limit = time.monotonic() + PATIENCE_S
+        while any(pathlib.Path(f"/proc/{pid}").exists() for pid in servers) and time.monotonic() < limit:
+            time.sleep(0.01)
+        self.assertEqual([pid for pid in servers if pathlib.Path(f"/proc/{pid}").exists()], [])
+
+    def test_late_server(self):
+        ports = "7655,7656,7657"
+        run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
+        run.working_servers(1)
+        environment = dict(os.environ, XDG_CACHE_HOME=self.folder)
+        late = subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", "late", "--quiet"], env=environment)
+        stats = run.finish()
+        late.terminate()
+        self.assertEqual(late.wait(timeout=PATIENCE_S), 0)
+        self.check(stats, died=0)
+        samples = {server["name"]: server["samples"] for server in stats["servers"]}
+        self.assertEqual(set(samples), {"server-1", "late"})
+        self.assertGreater(samples["late"], 0)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
