@@ -144,6 +144,27 @@ TEST_CASE("a shadow ray hits neither the surface it starts on nor the one it aim
     });
 }
 
+TEST_CASE("a shadow ray from far away does not hit the small light it aims at") {
+    // At the origin of space the light's own error is tiny; what counts is where a ray of 3000 lights' lengths ends.
+    HashRng rng(5);
+    const Mesh light = random_soup(200, 6);
+    int rays = 0, hits = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const std::uint32_t triangle = rng.next_u32() % light.triangle_count();
+        const SurfacePoint end = random_surface_point(light, triangle, rng);
+        SurfacePoint start;
+        start.position = random_direction(rng) * 3000;
+        start.position_error = abs(start.position) * 0x1p-24f;
+        start.geometric_normal = random_direction(rng);
+        if (in_tangent_plane(end, start.position, start.position_error)) continue;
+        ++rays;
+        for (const TriangleCorners& copy : copies(corners(light, triangle)))
+            hits += intersect_triangle(spawn_ray_to(start, end), copy).has_value();
+    }
+    CHECK(rays > 15000);
+    CHECK(hits == 0);
+}
+
 TEST_CASE("a shadow ray spans what lies between, and has length one") {
     Mesh mesh;
     add_quad(mesh, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});

@@ -11,9 +11,10 @@
 ///   along a face of a flat one, can fall between near and far. So far is stretched by 1 + 2^-21.
 /// - The triangle test (geometry/triangle.hpp) has an error of its own, about 2^-50 of the distances, by which a hit
 ///   may stick out of its box. So the origin is moved, towards the near planes for t_near and away from the far ones
-///   for t_far, by 2^-48 of the scene and a few ulps of its own, lest the sum be rounded back.
-/// - Division by zero. A direction component of 0 gives 0 * infinity = NaN where the origin is on a plane. So its
-///   inverse is the largest float instead of infinity; with the moved origin no product is 0.
+///   for t_far, by 2^-48 of the scene and a few ulps of its own, lest the sum be rounded away.
+/// - Division by zero. A direction component of 0 has an infinite inverse, and 0 * infinity is NaN where the origin is
+///   on a plane. The moved origin is not: where the origin is on the border of the slab, it is inside, and the products
+///   are -infinity and +infinity.
 ///
 /// Ensures: if intersect_triangle() reports a hit at t for a triangle inside the box, and t is in [t_min, t_max], then
 /// the box is met, with t_near <= t * (1 + 2^-21). This is what makes the closest hit independent of the tree.
@@ -25,7 +26,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "pathscope/math/box.hpp"
 #include "pathscope/math/ray.hpp"
@@ -41,7 +41,7 @@ struct SlabPlanes {
 
 struct BoxRay {
     Vec3 near_origin, far_origin;
-    Vec3 inverse;  ///< 1 / direction, finite.
+    Vec3 inverse;  ///< 1 / direction; infinite where that is zero, with its sign.
     SlabPlanes x, y, z;
 
     /// scene: encloses all boxes that will be tested.
@@ -54,13 +54,11 @@ struct BoxRay {
                 std::copysign(std::abs(ray.origin[axis]) * 0x1p-22f + error, ray.direction[axis]);
             near_origin[axis] = ray.origin[axis] + shift;
             far_origin[axis] = ray.origin[axis] - shift;
-            inverse[axis] = std::clamp(1 / ray.direction[axis], -k_largest, k_largest);
+            inverse[axis] = 1 / ray.direction[axis];
         }
     }
 
   private:
-    static constexpr float k_largest = std::numeric_limits<float>::max();
-
     static SlabPlanes planes(Vec3 direction, std::size_t axis) {
         const bool backward = std::signbit(direction[static_cast<int>(axis)]);
         return backward ? SlabPlanes{axis + 3, axis} : SlabPlanes{axis, axis + 3};

@@ -12,8 +12,9 @@
 /// copies of the triangle: they lie in the same plane. Use the geometric normal, never the shading
 /// normal: only the former knows where the surface is.
 ///
-/// A shadow ray has two ends to keep clear: its target is moved off the light's surface in the same way, by an
-/// error that includes the rounding of the direction, and t_max stops 2^-21 of the distance short of it.
+/// A shadow ray has two ends to keep clear. It ends at the target moved off the light's surface in the same way, by an
+/// error to which 2^-22 of the distance is added: that far can the rounding of direction and length carry the
+/// end of the ray.
 ///
 /// Ensures: direction of length one. Thread safety: pure.
 /// Reference: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., section 6.8.6.
