@@ -25,8 +25,8 @@ void render_part(const Scene& scene, const Camera& camera, const RenderSettings&
 
 }  // namespace
 
-RenderedFrame compose_frame(const FrameSums& direct, const FrameSums& indirect, const RenderSettings& settings,
-                    const Guides& guides, int threads) {
+RenderedFrame compose_frame(const FrameSums& direct, const FrameSums& indirect,
+                            const RenderSettings& settings, const Guides& guides, int threads) {
     RenderedFrame frame;
     frame.direct = direct.mean();
     frame.unfiltered = indirect.mean();

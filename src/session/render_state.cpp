@@ -10,9 +10,10 @@
 namespace pathscope {
 namespace {
 
-constexpr std::array<std::string_view, 17> k_keys{
-    "scene", "files",      "material", "smoothing", "camera",   "size",    "spp",    "direct_spp", "seed",
-    "light", "hemisphere", "mis",      "sampler",   "roulette", "bounces", "filter", "quantum"};
+constexpr std::array<std::string_view, 18> k_keys{
+    "scene", "files",      "material", "smoothing", "camera",        "size",
+    "spp",   "direct_spp", "seed",     "light",     "light_samples", "hemisphere",
+    "mis",   "sampler",    "roulette", "bounces",   "filter",        "quantum"};
 
 PackValue pack_vec(Vec3 v) { return PackArray{double(v.x), double(v.y), double(v.z)}; }
 
@@ -159,6 +160,7 @@ PackMap encode_state(const RenderState& state) {
     map.set("direct_spp", settings.direct_spp);
     map.set("seed", settings.seed);
     map.set("light", name_of(transport.light));
+    map.set("light_samples", transport.light_samples);
     map.set("hemisphere", name_of(transport.hemisphere));
     map.set("mis", name_of(transport.mis));
     map.set("sampler", name_of(transport.sampler));
@@ -184,6 +186,7 @@ Result<RenderState> decode_state(const PackMap& map) {
     settings.direct_spp = fields.u32("direct_spp", 0, k_max_samples_per_pixel);
     settings.seed = fields.u32("seed");
     settings.transport.light = fields.enumerator<LightSampling>("light");
+    settings.transport.light_samples = int(fields.u32("light_samples", 1, k_max_light_samples));
     settings.transport.hemisphere = fields.enumerator<HemisphereSampling>("hemisphere");
     settings.transport.mis = fields.enumerator<MisHeuristic>("mis");
     settings.transport.sampler = fields.enumerator<SamplerKind>("sampler");

@@ -21,7 +21,8 @@ double corner_form_factor(double a, double b, double h) {
 }
 
 /// Direct light of a white floor seen from above, below a quad light centred over it.
-Moments floor_radiance(const TransportSettings& settings, float half_u, float half_v, float height, Rgb radiance) {
+Moments floor_radiance(const TransportSettings& settings, float half_u, float half_v, float height,
+                       Rgb radiance) {
     SceneParts parts = empty_parts();
     add_rectangle(parts, {-50, 0, -50}, {0, 0, 100}, {100, 0, 0}, add_material(parts, lambert({1, 1, 1})));
     const QuadLightSpec light{{-half_u, height, -half_v}, {2 * half_u, 0, 0}, {0, 0, 2 * half_v}, radiance};

@@ -88,7 +88,9 @@ std::vector<PixelMoments> room_picture(const Scene& scene, const Settings& setti
 
 }  // namespace
 
-TEST_CASE("furnace: a closed box with emission Le and albedo rho has radiance Le / (1 - rho), and Le rho^n per bounce") {
+TEST_CASE(
+    "furnace: a closed box with emission Le and albedo rho has radiance Le / (1 - rho), and Le rho^n per "
+    "bounce") {
     const float le = 0.75f;
     const int samples = k_sanitized ? 4000 : 60'000;
     for (const float rho : {0.2f, 0.5f, 0.8f}) {
@@ -104,8 +106,10 @@ TEST_CASE("furnace: a closed box with emission Le and albedo rho has radiance Le
                 const Ray ray{{0.1f, -0.2f, 0.3f}, direction};
                 BounceProbe probe;
                 std::uint64_t rays = 0;
-                const Rgb direct = estimate_radiance<LightPart::direct>(scene, settings, ray, sampler, rays, probe);
-                const Rgb indirect = estimate_radiance<LightPart::indirect>(scene, settings, ray, sampler, rays, probe);
+                const Rgb direct =
+                    estimate_radiance<LightPart::direct>(scene, settings, ray, sampler, rays, probe);
+                const Rgb indirect =
+                    estimate_radiance<LightPart::indirect>(scene, settings, ray, sampler, rays, probe);
                 total.add(direct.x + indirect.x);
                 for (std::size_t n = 0; n < bounces.size(); ++n) bounces[n].add(probe.radiance[n]);
             }
@@ -127,8 +131,8 @@ TEST_CASE("direct + indirect is what a plain recursive path tracer finds, in bot
     const int size = 6, samples = k_sanitized ? 500 : 12'000;
     const auto oracle = picture(size, 2 * samples, [&](int x, int y, std::uint32_t sample) {
         HashRng rng(hash_combine(std::uint32_t(y * size + x), sample));
-        return radiance_by_recursion(scene, room_ray(x, y, size, PixelSampler(SamplerKind::independent, 6, x, y, sample)),
-                                     rng);
+        return radiance_by_recursion(
+            scene, room_ray(x, y, size, PixelSampler(SamplerKind::independent, 6, x, y, sample)), rng);
     });
     const auto best = room_picture(scene, make_settings(Setting::best), size, samples);
     const auto textbook = room_picture(scene, make_settings(Setting::textbook), size, samples);
@@ -141,13 +145,14 @@ TEST_CASE("every lever alone leaves the image as it is") {
     const Scene scene = small_room();
     const int size = 4, samples = k_sanitized ? 500 : 10'000;
     const auto best = room_picture(scene, make_settings(Setting::best), size, samples);
-    std::vector<TransportSettings> variants(6, make_settings(Setting::best));
+    std::vector<TransportSettings> variants(7, make_settings(Setting::best));
     variants[0].light = LightSampling::area;
     variants[1].hemisphere = HemisphereSampling::uniform;
     variants[2].hemisphere = HemisphereSampling::cosine;
     variants[3].mis = MisHeuristic::off;
     variants[4].mis = MisHeuristic::balance;
     variants[5].roulette.kind = Roulette::constant;
+    variants[6].light_samples = 3;
     for (std::size_t i = 0; i < variants.size(); ++i) {
         CAPTURE(i);
         CHECK(same_mean(room_picture(scene, variants[i], size, samples), best));

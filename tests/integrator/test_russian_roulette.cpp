@@ -17,7 +17,8 @@ TEST_CASE("E[roulette] = 1: survivors carry the weight of the dead, for every ki
             HashRng rng(17);
             double sum = 0;
             for (int i = 0; i < n; ++i)
-                sum += roulette_weight(throughput, params.first_bounce, rng.next_float(), params).value_or(0.0f);
+                sum +=
+                    roulette_weight(throughput, params.first_bounce, rng.next_float(), params).value_or(0.0f);
             // A survivor weighs 1/q with probability q: the variance is 1/q - 1. Five standard errors.
             const double q = kind == Roulette::constant ? params.constant_survival
                                                         : std::min(throughput, params.max_survival);

@@ -4,7 +4,7 @@
 ///   ∫ f Le V cos dw  ≈  w_l f Le V cos / p_l   by a sampled light (sample_direct_light), and
 ///                       w_b f Le cos / p_b     by the direction the path takes anyway (emission_towards)
 ///
-/// with w_l + w_b = 1 for each direction (sampling/mis.hpp). With MIS off the light sample counts alone, and an emitter
+/// with w_l + w_b = 1 for each direction (sampling/mis.hpp); p_l counts all n light samples: p_l = n P(light) pdf. With MIS off the light sample counts alone, and an emitter
 /// that the path runs into counts only after the camera or a delta lobe, which no light sample can reach.
 /// Why both: a small light is found by sampling lights, a mirror-like surface finds a large one by itself (Veach's
 /// plates).
@@ -20,12 +20,12 @@
 
 namespace pathscope {
 
-/// One light sample at the vertex: f Le V cos / p_l, with its MIS weight. Requires: !vertex.specular.
-[[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
-                                             const Vertex& vertex, const BounceSample& random,
-                                             std::uint64_t& rays) {
-    const std::optional<LightSample> light = sample_light(scene, settings.light, vertex.light_reference(),
-                                                          random.light_pick(), random.light_point());
+/// One of the light samples at a vertex: f Le V cos / p_l, with its MIS weight, and divided by their number.
+[[nodiscard]] inline Rgb one_light_sample(const Scene& scene, const TransportSettings& settings,
+                                          const Vertex& vertex, float u_pick, Vec2 u_point,
+                                          std::uint64_t& rays) {
+    const std::optional<LightSample> light =
+        sample_light(scene, settings.light, vertex.light_reference(), u_pick, u_point);
     if (!light || !is_consistent(vertex.shaded, light->direction)) return {};
 
     const Vec3 incoming = vertex.shaded.frame.to_local(light->direction);
@@ -35,9 +35,28 @@ namespace pathscope {
     ++rays;
     if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
 
-    const float weight =
-        light->delta ? 1.0f : mis_weight(settings.mis, light->pdf_solid_angle, bsdf.pdf_solid_angle);
-    return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / light->pdf_solid_angle);
+    const float density = float(settings.light_samples) * light->pdf_solid_angle;
+    const float weight = light->delta ? 1.0f : mis_weight(settings.mis, density, bsdf.pdf_solid_angle);
+    return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / density);
+}
+
+/// Light at the vertex by settings.light_samples samples: a lattice of n points, turned by one random shift, so that sun
+/// and sky, or two lamps, are seldom picked by chance alone. Requires: !vertex.specular.
+[[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
+                                             const Vertex& vertex, const BounceSample& random,
+                                             std::uint64_t& rays) {
+    const float u_pick = random.light_pick();
+    const Vec2 u_point = random.light_point();
+    Rgb sum;
+    for (int i = 0; i < settings.light_samples; ++i) {
+        const float shift = float(i) / float(settings.light_samples);
+        const auto turned = [shift](float u) {
+            return u + shift < 1 ? u + shift : std::max(u + shift - 1, 0.0f);
+        };
+        sum +=
+            one_light_sample(scene, settings, vertex, turned(u_pick), {turned(u_point.x), u_point.y}, rays);
+    }
+    return sum;
 }
 
 /// What the ray runs into sends back along it, with the MIS weight of having found it this way.
@@ -53,7 +72,8 @@ namespace pathscope {
     const float light_pdf =
         hit ? sample_light_pdf(scene, settings.light, origin.reference, *hit)
             : sample_environment_pdf(scene, settings.light, origin.reference, ray.direction);
-    return emitted * mis_weight(settings.mis, origin.pdf_solid_angle, light_pdf);
+    return emitted *
+           mis_weight(settings.mis, origin.pdf_solid_angle, float(settings.light_samples) * light_pdf);
 }
 
 }  // namespace pathscope

@@ -86,7 +86,8 @@ template <LightPart part, class Probe = NullPathProbe>
         if (!next) break;
         throughput *= next->weight;
         if (is_zero(throughput)) break;
-        if (!is_finite(throughput)) return throughput;  // Not a radiance: the caller drops and counts the sample.
+        if (!is_finite(throughput))
+            return throughput;  // Not a radiance: the caller drops and counts the sample.
         const bool plays_roulette =
             diffuse_vertices > 0 ? part == LightPart::indirect : bounce >= k_free_specular_bounces;
         if (plays_roulette) {

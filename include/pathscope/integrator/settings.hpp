@@ -3,7 +3,7 @@
 ///
 ///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
 ///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
-///   best:     light by power, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
+///   best:     light by power, two samples of it per vertex, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
 ///
 /// Why: both converge to the same image, so a lesson can ask what each lever buys.
 /// Thread safety: values.   Test: tests/integrator/test_settings.cpp
@@ -27,6 +27,7 @@ constexpr const auto& enum_table(Setting) { return k_setting_names; }
 
 struct TransportSettings {
     LightSampling light = LightSampling::power;
+    int light_samples = 2;  ///< Per vertex, at least 1.
     HemisphereSampling hemisphere = HemisphereSampling::bsdf;
     MisHeuristic mis = MisHeuristic::power;
     SamplerKind sampler = SamplerKind::sobol;
@@ -40,6 +41,7 @@ struct TransportSettings {
     TransportSettings settings;
     if (setting == Setting::textbook) {
         settings.light = LightSampling::area;
+        settings.light_samples = 1;
         settings.hemisphere = HemisphereSampling::uniform;
         settings.mis = MisHeuristic::off;
         settings.sampler = SamplerKind::independent;
@@ -48,5 +50,7 @@ struct TransportSettings {
     }
     return settings;
 }
+
+inline constexpr int k_max_light_samples = 64;
 
 }  // namespace pathscope

@@ -25,7 +25,7 @@ struct RenderedFrame {
 
 /// `guides` is used, and must not be empty, when the filter runs at the client.
 [[nodiscard]] RenderedFrame compose_frame(const FrameSums& direct, const FrameSums& indirect,
-                                  const RenderSettings& settings, const Guides& guides, int threads);
+                                          const RenderSettings& settings, const Guides& guides, int threads);
 
 /// One machine, one loop: all rounds of a frame here, in order. What every distributed image must equal, bit for bit.
 struct LocalRender {
