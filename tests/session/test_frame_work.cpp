@@ -1,0 +1,170 @@
+#include "pathscope/session/frame_work.hpp"
+
+#include <vector>
+
+#include "testing.hpp"
+
+using namespace pathscope;
+
+namespace {
+
+constexpr ServerId k_server{1};
+
+/// 5 x 3 blocks, of which the last column and row are smaller; the last round of each is shorter.
+RenderSettings small_frame() {
+    RenderSettings settings;
+    settings.width = 70;
+    settings.height = 40;
+    settings.spp = 10;
+    settings.direct_spp = 3;
+    settings.quantum = Quantum{0};
+    return settings;
+}
+
+/// The work of a small frame, with one server to give rounds to. Times are all zero: nothing here expires.
+struct SmallWork {
+    EventStore store;
+    FrameWork work{{16, 4}, store};
+
+    explicit SmallWork(const RenderSettings& settings = small_frame()) { begin(settings, Epoch{1}); }
+
+    std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch) {
+        std::vector<Lease> dropped = work.begin(settings, epoch, 0);
+        work.set_servers({{k_server, 0}});
+        return dropped;
+    }
+    std::optional<Lease> grant(LightPart part) {
+        if (part == LightPart::direct) return work.grant_direct(0);
+        return work.grant_indirect(k_server, 0, [](const Round&, std::uint32_t) { return k_second_ns; });
+    }
+    Verdict commit(LightPart part, const Lease& lease) {
+        const ResultClaim claim{lease.id, lease.epoch, lease.unit, lease.first, lease.count, lease.server};
+        return work.commit(part, claim, light(lease), 0).verdict;
+    }
+    /// Sample s of block b has the radiance (s + 1) (b + 1): no two samples of a block can stand for each other.
+    [[nodiscard]] std::vector<PixelSum> light(const Lease& lease) const {
+        std::int64_t sum = 0;
+        for (std::uint32_t s = lease.first; s < lease.first + lease.count; ++s)
+            sum += std::int64_t(s + 1) * (lease.unit + 1);
+        return std::vector<PixelSum>(std::size_t(work.round_of(lease).rect.area()),
+                                     PixelSum{sum, 2 * sum, 0});
+    }
+    /// Commits all rounds that there are; how many.
+    int finish(LightPart part) {
+        int rounds = 0;
+        while (const auto lease = grant(part)) {
+            REQUIRE(commit(part, *lease) == Verdict::accepted);
+            ++rounds;
+        }
+        return rounds;
+    }
+};
+
+bool is_black(const FrameSums& sums) {
+    for (const Rgb& pixel : sums.mean().pixels)
+        if (!(pixel == Rgb{})) return false;
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("each sample of each block is granted once, and its light added once") {
+    SmallWork frame;
+    CHECK(frame.work.direct_progress() == 0);
+    CHECK(frame.work.indirect_progress() == 0);
+    CHECK(frame.finish(LightPart::direct) == 15);
+    CHECK(frame.work.direct_complete());
+    CHECK(!frame.work.complete());
+    CHECK(frame.finish(LightPart::indirect) == 45);
+    CHECK(frame.work.complete());
+    CHECK(frame.work.direct_progress() == 1);
+    CHECK(frame.work.indirect_progress() == 1);
+    CHECK(bool(frame.work.indirect_ledger().audit()));
+
+    const BlockGrid& grid = frame.work.indirect().grid();
+    const Image direct = frame.work.direct().mean(), indirect = frame.work.indirect().mean();
+    for (std::uint32_t block = 0; block < grid.count(); ++block) {
+        CHECK(frame.work.direct().samples_of_block(block) == 3);
+        CHECK(frame.work.indirect().samples_of_block(block) == 10);
+    }
+    for (int y = 0; y < 40; ++y)
+        for (int x = 0; x < 70; ++x) {
+            const float b = float(grid.block_at(x, y) + 1);
+            REQUIRE(direct.at(x, y) == Rgb{2 * b, 4 * b, 0});        // mean of 1..3
+            REQUIRE(indirect.at(x, y) == Rgb{5.5f * b, 11 * b, 0});  // mean of 1..10
+        }
+}
+
+TEST_CASE("a result adds light if and only if it is accepted") {
+    for (const LightPart part : {LightPart::direct, LightPart::indirect}) {
+        SmallWork frame;
+        const FrameSums& sums = part == LightPart::direct ? frame.work.direct() : frame.work.indirect();
+        const auto first = frame.grant(part), second = frame.grant(part);
+        REQUIRE(bool(first));
+        REQUIRE(bool(second));
+        CHECK(frame.commit(part, *first) == Verdict::accepted);
+        const std::vector<Rgb> once = sums.mean().pixels;
+        CHECK(!is_black(sums));
+        CHECK(frame.commit(part, *first) == Verdict::duplicate);
+        Lease forged = *second;
+        forged.server = ServerId{7};
+        CHECK(frame.commit(part, forged) == Verdict::mismatched);
+        CHECK(sums.mean().pixels == once);
+        CHECK(sums.samples_of_block(first->unit) == first->count);
+        CHECK(sums.samples_of_block(second->unit) == 0);
+
+        // The picture changes: what is under way belongs to the old one.
+        const std::vector<Lease> dropped = frame.begin(small_frame(), Epoch{2});
+        CHECK(dropped.size() == (part == LightPart::indirect ? 1 : 0));  // Only servers have to be told.
+        CHECK(is_black(sums));
+        CHECK(frame.commit(part, *second) == Verdict::stale_epoch);
+        CHECK(is_black(sums));
+        CHECK(sums.samples_of_block(second->unit) == 0);
+        CHECK(frame.work.direct_progress() + frame.work.indirect_progress() == 0);
+        CHECK(frame.finish(part) == (part == LightPart::direct ? 15 : 45));
+    }
+}
+
+TEST_CASE("there is a picture once each block has a round of each part") {
+    SmallWork frame;
+    CHECK(!frame.work.has_image());
+    frame.finish(LightPart::direct);
+    for (int rounds = 0; rounds < 15; ++rounds) {
+        CHECK(!frame.work.has_image());
+        REQUIRE(frame.commit(LightPart::indirect, *frame.grant(LightPart::indirect)) == Verdict::accepted);
+        CHECK(frame.work.indirect_progress() == doctest::Approx((rounds + 1) / 45.0));
+    }
+    CHECK(frame.work.has_image());
+    CHECK(!frame.work.complete());
+    frame.begin(small_frame(), Epoch{2});
+    CHECK(!frame.work.has_image());
+}
+
+TEST_CASE("a stopped frame grants nothing more, and is complete when nothing is outstanding") {
+    SmallWork frame;
+    const auto direct = frame.grant(LightPart::direct), indirect = frame.grant(LightPart::indirect);
+    REQUIRE(bool(direct));
+    REQUIRE(bool(indirect));
+    frame.work.stop();
+    CHECK(!frame.grant(LightPart::direct));
+    CHECK(!frame.grant(LightPart::indirect));
+    frame.work.release_direct(*direct, 0);
+    CHECK(frame.work.direct_complete());
+    CHECK(!frame.work.complete());
+    CHECK(frame.commit(LightPart::indirect, *indirect) == Verdict::accepted);
+    CHECK(frame.work.complete());
+    CHECK(frame.work.indirect_progress() < 1);
+    CHECK(frame.work.indirect().samples_of_block(indirect->unit) == indirect->count);
+}
+
+TEST_CASE("a part of no samples is complete at once, and no picture waits for it") {
+    RenderSettings settings = small_frame();
+    settings.spp = 0;
+    SmallWork frame(settings);
+    CHECK(!frame.grant(LightPart::indirect));
+    CHECK(frame.work.indirect_progress() == 1);
+    CHECK(!frame.work.complete());
+    frame.finish(LightPart::direct);
+    CHECK(frame.work.has_image());
+    CHECK(frame.work.complete());
+}
