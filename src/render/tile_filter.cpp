@@ -13,7 +13,7 @@ std::vector<PixelSum> filter_tile(const Scene& scene, const Camera& camera, cons
     const Image filtered = joint_bilateral(noisy, guides, settings.bilateral, threads);
 
     std::vector<PixelSum> result(sums.size());
-    bool saturated = false;  // A mean of samples in range is in range.
+    bool saturated = false;  // Clamped only if demodulation by a dark albedo lifts a mean beyond the range.
     for (std::size_t i = 0; i < sums.size(); ++i) {
         const PixelSum one = quantise(filtered.pixels[i], settings.quantum, saturated);
         const std::int64_t count = round.count;

@@ -75,6 +75,7 @@ RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) c
     if (outcome.result && samples_per_second_ > 0) {
         const double seconds = double(outcome.result->samples) / samples_per_second_;
         cancellation.wait_until(outcome.started + from_seconds(seconds));
+        if (cancellation.flag().load()) outcome.result.reset();
     }
     outcome.duration = monotonic_now() - outcome.started;
     return outcome;

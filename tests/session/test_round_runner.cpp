@@ -90,6 +90,7 @@ TEST_CASE("a cancelled round that waits has an empty outcome, and cancelling end
         run.runner.cancel(9);
         const std::vector<RoundOutcome> outcomes = run.take(3);  // Then 8 holds up the rest.
         CHECK(outcomes[0].ticket == 9);
+        CHECK_FALSE(outcomes[0].result.has_value());
         CHECK(outcomes[1].ticket == 1);
         CHECK(!outcomes[1].result);
         CHECK(outcomes[1].failure.empty());

@@ -31,7 +31,8 @@ class FrameWork {
   public:
     FrameWork(const WorkPlan& plan, EventStore& store);
 
-    /// Begins the frame anew: nothing of the epoch before reaches it. Returns the leases that were outstanding.
+    /// Begins the frame anew: nothing of the epoch before reaches it. Returns the leases that were outstanding. Who may be
+    /// given rounds has to be said again.
     std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch, TimeNs now);
 
     /// Who may be given indirect rounds.
