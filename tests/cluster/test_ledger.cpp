@@ -131,7 +131,8 @@ TEST_CASE("a result that is not what its lease says is refused, and the lease st
     CHECK(ledger.outstanding() == 1);
     CHECK(verdict_of(ledger, good) == Verdict::accepted);
 
-    // Without the record, the range must still be one of the plan's.
+    // Without the record, the range must still be one of the plan's, and committed to be a duplicate.
+    CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = 4; })) == Verdict::unknown);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = 2; })) == Verdict::mismatched);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.unit = 4; })) == Verdict::mismatched);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = ~0u, c.count = ~0u; })) ==
