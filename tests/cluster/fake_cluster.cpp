@@ -423,8 +423,9 @@ void FakeCluster::check_all() {
 
 bool FakeCluster::someone_can_work() const {
     if (settings_.local_fallback) return true;
-    return std::any_of(processes_.begin(), processes_.end(),
-                       [&](const Process& process) { return process.running; });
+    return std::any_of(processes_.begin(), processes_.end(), [&](const Process& process) {
+        return process.running && now_ >= process.frozen_until;
+    });
 }
 
 void FakeCluster::check_progress() {
