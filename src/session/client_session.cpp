@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
@@ -35,13 +36,6 @@ std::uint64_t random_session() {
 std::uint64_t size_of(const Frames& frames) {
     return std::accumulate(frames.begin(), frames.end(), std::uint64_t{0},
                            [](std::uint64_t sum, const std::string& frame) { return sum + frame.size(); });
-}
-
-SocketOptions socket_options(Channel channel) {
-    SocketOptions options;
-    options.max_frame_bytes = std::int64_t(max_frame_bytes(channel));
-    options.linger_ms = 200;  // Lets a BYE leave.
-    return options;
 }
 
 /// The classic detector looks every six seconds; the adaptive one needs beats.
@@ -91,9 +85,9 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
 
 ClientSession::~ClientSession() {
     for (const auto& [instance, server] : servers_) {
-        const bool is_ours = std::any_of(
-            local_servers_.begin(), local_servers_.end(),
-            [&](const LocalServer& local) { return std::uint32_t(local.process.pid()) == server.pid; });
+        const bool is_ours =
+            std::any_of(local_servers_.begin(), local_servers_.end(),
+                        [&](const LocalServer& local) { return local.is(server.pid, server.name); });
         send(Channel::monitor, instance,
              message::Bye{is_ours ? ByeReason::stop : ByeReason::leaving, "The frame is finished."});
     }
@@ -105,11 +99,11 @@ Result<void> ClientSession::open_sockets() {
                         : fmt::format("tcp://{}:{}", config_.host, config_.ports[channel]);
     };
     const auto open = [&](bool any_port) -> Result<Sockets> {
-        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), socket_options(Channel::input));
+        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), channel_options(Channel::input));
         if (!input) return input.error();
-        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), socket_options(Channel::monitor));
+        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), channel_options(Channel::monitor));
         if (!monitor) return monitor.error();
-        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), socket_options(Channel::frames));
+        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), channel_options(Channel::frames));
         if (!frames) return frames.error();
         return Sockets{std::move(*input), std::move(*monitor), std::move(*frames)};
     };
@@ -340,7 +334,7 @@ void ClientSession::on_hello(const std::string& instance, const message::Hello& 
         store_.name_server(id, hello.name);
         store_.count(Counter::servers_joined, 1, id);
         for (LocalServer& local : local_servers_)
-            if (std::uint32_t(local.process.pid()) == hello.pid) local.joined = true;
+            if (local.is(hello.pid, hello.name)) local.joined = true;
         step_peer(found->second, PeerCause::welcomed, fmt::format("{} said HELLO.", hello.name));
     }
     send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());
@@ -443,7 +437,7 @@ void ClientSession::watch_local_servers() {
         if (!ending) continue;
         local.ended = true;
         const auto server = std::find_if(servers_.begin(), servers_.end(), [&](const auto& entry) {
-            return entry.second.pid == std::uint32_t(local.process.pid());
+            return local.is(entry.second.pid, entry.second.name);
         });
         const std::string why = fmt::format("Its process ended with {}.", *ending);
         if (server != servers_.end()) {
@@ -624,8 +618,7 @@ void ClientSession::on(Server& server, message::Tile& tile) {
         work_.commit(LightPart::indirect, claim, {}, now);
         return;
     }
-    const Round round{tile.unit, {}, tile.first, tile.count};
-    const std::int64_t pixels = work_.indirect().grid().rect(round.block).area();
+    const std::int64_t pixels = work_.indirect().grid().rect(tile.unit).area();
     RoundResult result;
     result.rays = tile.rays;
     result.samples = std::uint64_t(pixels) * tile.count;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/core/parallel_for.hpp"
 #include "pathscope/net/poller.hpp"
@@ -29,13 +30,6 @@ std::string default_name() {
     char host[65] = {};
     ::gethostname(host, sizeof host - 1);
     return fmt::format("{}-{}", host, ::getpid());
-}
-
-SocketOptions socket_options(Channel channel) {
-    SocketOptions options;
-    options.max_frame_bytes = std::int64_t(max_frame_bytes(channel));
-    options.linger_ms = 200;  // Lets a BYE leave.
-    return options;
 }
 
 }  // namespace
@@ -79,13 +73,13 @@ Result<void> ServerSession::dial() {
     const std::string instance = random_routing_id();
     // Input first: what is published after WELCOME was made must not be missed if it can be helped.
     auto input = SubscriberSocket::connect(context_, endpoint(config_, 0), std::string(k_input_topic),
-                                           socket_options(Channel::input));
+                                           channel_options(Channel::input));
     if (!input) return input.error();
     auto monitor =
-        DealerSocket::connect(context_, endpoint(config_, 1), instance, socket_options(Channel::monitor));
+        DealerSocket::connect(context_, endpoint(config_, 1), instance, channel_options(Channel::monitor));
     if (!monitor) return monitor.error();
     auto frames =
-        DealerSocket::connect(context_, endpoint(config_, 2), instance, socket_options(Channel::frames));
+        DealerSocket::connect(context_, endpoint(config_, 2), instance, channel_options(Channel::frames));
     if (!frames) return frames.error();
     link_.emplace(Link{instance, std::move(*input), std::move(*monitor), std::move(*frames)});
     phase_ = Phase::hello;

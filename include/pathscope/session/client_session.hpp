@@ -103,6 +103,11 @@ class ClientSession {
         std::string name;
         bool joined = false;
         bool ended = false;
+
+        /// Process ids repeat from machine to machine: the name must be ours as well.
+        [[nodiscard]] bool is(std::uint32_t pid, std::string_view other_name) const {
+            return pid == std::uint32_t(process.pid()) && name == other_name;
+        }
     };
 
     ClientSession(const ClientConfig& config, ClientJob job, EventStore& store, WakePair wake);
