@@ -121,7 +121,8 @@ class Loader {
                                          files_.display_name(scene_name("", scene_.objs[0]))));
         if (const auto known = check_override_names(); !known) return known.error();
         finish_materials();
-        Result<std::vector<Texture>> textures = requests_.load(files_, parts_.materials);
+        Result<std::vector<Texture>> textures =
+            requests_.load(files_, options_.texel_space, parts_.materials);
         if (!textures) return textures.error();
         parts_.textures = std::move(*textures);
         if (const auto envmap = load_envmap(); !envmap) return envmap.error();

@@ -19,6 +19,7 @@ std::array<float, 256> make_table(float (*decode)(std::uint8_t)) {
     return table;
 }
 const std::array<float, 256> k_srgb_to_linear = make_table(decode_srgb8);
+const std::array<float, 256> k_plain = make_table([](std::uint8_t code) { return float(code) / 255.0f; });
 
 /// Where texel (x, y), counted from the upper left, lies among the texels.
 std::size_t texel_index(std::size_t x, std::size_t y, std::size_t tiles_per_row) {
@@ -59,8 +60,8 @@ std::uint8_t grey_of(const std::uint8_t* pixel, int channels, bool take_alpha) {
 
 }  // namespace
 
-Texture::Texture(TextureUsage usage, const Image8& image)
-    : usage_(usage), width_(image.width), height_(image.height) {
+Texture::Texture(TextureUsage usage, const Image8& image, TexelSpace space)
+    : usage_(usage), space_(space), width_(image.width), height_(image.height) {
     CHECK(width_ > 0 && height_ > 0 && image.channels >= 1 && image.channels <= 4, width_, height_,
           image.channels);
     const auto width = std::size_t(width_), height = std::size_t(height_),
@@ -94,12 +95,17 @@ Rgb Texture::eval(Vec2 uv) const {
         return {grey, grey, grey};
     }
     const Footprint x = footprint(uv.x, width_), y = footprint(1 - uv.y, height_);
-    const auto texel = [&](std::size_t column, std::size_t row) {
-        const std::uint8_t* rgb = &texels_[texel_index(column, row, tiles_per_row_) * 4];
-        return Rgb{k_srgb_to_linear[rgb[0]], k_srgb_to_linear[rgb[1]], k_srgb_to_linear[rgb[2]]};
+    const auto blend = [&](const std::array<float, 256>& value_of) {
+        const auto texel = [&](std::size_t column, std::size_t row) {
+            const std::uint8_t* rgb = &texels_[texel_index(column, row, tiles_per_row_) * 4];
+            return Rgb{value_of[rgb[0]], value_of[rgb[1]], value_of[rgb[2]]};
+        };
+        return lerp(lerp(texel(x.first, y.first), texel(x.second, y.first), x.weight),
+                    lerp(texel(x.first, y.second), texel(x.second, y.second), x.weight), y.weight);
     };
-    return lerp(lerp(texel(x.first, y.first), texel(x.second, y.first), x.weight),
-                lerp(texel(x.first, y.second), texel(x.second, y.second), x.weight), y.weight);
+    if (space_ == TexelSpace::linear) return blend(k_srgb_to_linear);
+    const Rgb code = blend(k_plain);
+    return {decode_srgb(code.x), decode_srgb(code.y), decode_srgb(code.z)};
 }
 
 float Texture::eval_grey(Vec2 uv) const {
@@ -113,10 +119,11 @@ float Texture::eval_grey(Vec2 uv) const {
            255.0f;
 }
 
-Result<Texture> decode_texture(std::string_view bytes, TextureUsage usage, const std::string& name) {
+Result<Texture> decode_texture(std::string_view bytes, TextureUsage usage, TexelSpace space,
+                               const std::string& name) {
     const Result<Image8> image = decode_ldr(bytes, name);
     if (!image) return image.error();
-    return Texture(usage, *image);
+    return Texture(usage, *image, space);
 }
 
 }  // namespace pathscope

@@ -19,7 +19,7 @@ TextureUse TextureRequests::request(const MapName& map, TextureUsage usage) {
     return {entry->second, map.scale, map.offset};
 }
 
-Result<std::vector<Texture>> TextureRequests::load(FileSource& files,
+Result<std::vector<Texture>> TextureRequests::load(FileSource& files, TexelSpace space,
                                                    std::vector<Material>& materials) const {
     std::vector<std::optional<std::string>> bytes;
     for (const Request& request : requests_) {
@@ -35,7 +35,7 @@ Result<std::vector<Texture>> TextureRequests::load(FileSource& files,
         if (!bytes[i])
             decoded[i] = bad_input(fmt::format("{}: there is no such file.", files.display_name(name)));
         else if (total_bytes <= k_max_texture_bytes)
-            decoded[i] = decode_texture(*bytes[i], usage, files.display_name(name));
+            decoded[i] = decode_texture(*bytes[i], usage, space, files.display_name(name));
         if (decoded[i]) total_bytes += decoded[i]->bytes();
     });
     if (total_bytes > k_max_texture_bytes)

@@ -21,7 +21,7 @@ class TextureRequests {
 
     /// An image that is missing or cannot be read is mentioned once; the materials that use it lose the map.
     /// An error if they need more than k_max_texture_bytes.
-    [[nodiscard]] Result<std::vector<Texture>> load(FileSource& files,
+    [[nodiscard]] Result<std::vector<Texture>> load(FileSource& files, TexelSpace space,
                                                     std::vector<Material>& materials) const;
 
   private:

@@ -10,10 +10,10 @@
 namespace pathscope {
 namespace {
 
-constexpr std::array<std::string_view, 18> k_keys{
-    "scene", "files",      "material", "smoothing", "camera",        "size",
-    "spp",   "direct_spp", "seed",     "light",     "light_samples", "hemisphere",
-    "mis",   "sampler",    "roulette", "bounces",   "filter",        "quantum"};
+constexpr std::array<std::string_view, 19> k_keys{
+    "scene",   "files",      "material", "smoothing", "texel_space",   "camera",     "size",
+    "spp",     "direct_spp", "seed",     "light",     "light_samples", "hemisphere", "mis",
+    "sampler", "roulette",   "bounces",  "filter",    "quantum"};
 
 PackValue pack_vec(Vec3 v) { return PackArray{double(v.x), double(v.y), double(v.z)}; }
 
@@ -154,6 +154,7 @@ PackMap encode_state(const RenderState& state) {
     map.set("files", pack_digest(state.files));
     map.set("material", name_of(state.options.material));
     map.set("smoothing", state.options.smoothing);
+    map.set("texel_space", name_of(state.options.texel_space));
     map.set("camera", encode_camera(state.camera));
     map.set("size", PackArray{settings.width, settings.height});
     map.set("spp", settings.spp);
@@ -180,6 +181,7 @@ Result<RenderState> decode_state(const PackMap& map) {
     state.files = decode_digest(fields, "files");
     state.options.material = fields.enumerator<MaterialModel>("material");
     state.options.smoothing = fields.boolean("smoothing");
+    state.options.texel_space = fields.enumerator<TexelSpace>("texel_space");
     state.camera = decode_camera(fields);
     decode_size(fields, settings);
     settings.spp = fields.u32("spp", 0, k_max_samples_per_pixel);

@@ -71,6 +71,15 @@ TEST_CASE("colours are decoded from sRGB before they are mixed, grey values are 
     CHECK(colour.bytes() == 4 * grey.bytes());
 }
 
+TEST_CASE("in the space of codes, colours are mixed first and decoded afterwards") {
+    const Image8 image = image_of(2, 1, 1, {188, 0});
+    const Texture codes(TextureUsage::colour, image, TexelSpace::srgb);
+    CHECK(codes.eval({0.25f, 0.5f}).x == doctest::Approx(decode_srgb8(188)));
+    CHECK(codes.eval({0.5f, 0.5f}).x == doctest::Approx(decode_srgb8(94)));
+    const Texture grey(TextureUsage::grey, image, TexelSpace::srgb);
+    CHECK(grey.eval_grey({0.5f, 0.5f}) == 94 / 255.0f);
+}
+
 TEST_CASE("a texture agrees with a sum over all texels, at any uv and for any size") {
     HashRng rng(3);
     for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {4, 4}, {5, 9}, {13, 6}}) {
@@ -121,7 +130,7 @@ TEST_CASE("a grey texture takes the alpha channel where it says something, else 
 }
 
 TEST_CASE("bytes that are no image are an error with the name") {
-    const auto texture = decode_texture("not an image", TextureUsage::colour, "a.png");
+    const auto texture = decode_texture("not an image", TextureUsage::colour, TexelSpace::linear, "a.png");
     REQUIRE_FALSE(texture);
     CHECK(texture.error().message.find("a.png") != std::string::npos);
 }

@@ -77,6 +77,8 @@ void add_levers(CLI::App& app, RenderOptions& options) {
            "normals where the OBJ gives none: smooth within smoothing groups, or flat (on)")
         ->check(CLI::IsMember({"on", "off"}))
         ->type_name("on|off");
+    add_lever(app, "--texel-space", options.scene_options.texel_space,
+              "in what colour textures are interpolated");
     add_lever(app, "--filter", options.settings.filter, "joint bilateral filter of indirect light");
     app.add_option("--filter-radius", options.settings.bilateral.radius,
                    fmt::format("in pixels ({})", options.settings.bilateral.radius))

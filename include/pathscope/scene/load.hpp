@@ -27,6 +27,7 @@ namespace pathscope {
 struct SceneOptions {
     MaterialModel material = MaterialModel::frostbite;
     bool smoothing = true;  ///< Where an OBJ gives no normals: smooth within smoothing groups, or flat.
+    TexelSpace texel_space = TexelSpace::linear;
 
     friend bool operator==(const SceneOptions&, const SceneOptions&) = default;
 };

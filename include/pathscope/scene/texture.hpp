@@ -4,8 +4,8 @@
 ///   uv -> texel space (u * width - 1/2, (1 - v) * height - 1/2); the four texels around it are weighted
 ///
 /// Convention: as in OBJ, u runs to the right and v upwards, (0, 0) is the lower left corner of the image; the
-/// rows of image files start at the top. Texel centres lie at half-integers. A colour texture holds values of
-/// sRGB, decoded to linear light by a table before they are weighted; a grey one holds plain numbers n / 255.
+/// rows of image files start at the top. Texel centres lie at half-integers. A colour texture holds codes of
+/// sRGB, decoded to linear light before they are weighted (TexelSpace); a grey one holds plain numbers n / 255.
 /// There are no mipmaps: a pixel's samples average the texels it sees. A uv that is not finite counts as 0.
 ///
 /// Why tiles: texels lie in 4x4 tiles, of 64 bytes (a cache line) for colours, because scattered look-ups of
@@ -13,12 +13,14 @@
 ///
 /// Thread safety: reading from any thread.   Test: tests/scene/test_texture.cpp
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pathscope/core/enum_names.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/image.hpp"
 #include "pathscope/math/vec.hpp"
@@ -30,10 +32,21 @@ enum class TextureUsage {
     grey,    ///< Linear; 1 byte per texel: the alpha channel if it is not all opaque, else the luminance.
 };
 
+/// In what the texels of a colour texture are weighted.
+enum class TexelSpace : std::uint8_t {
+    linear,  ///< Light: the mean of two texels sends half the light of each.
+    srgb,    ///< Codes, decoded afterwards, as some renderers do: darker where neighbours differ.
+};
+inline constexpr std::array k_texel_space_names{
+    EnumName{TexelSpace::linear, "linear"},
+    EnumName{TexelSpace::srgb, "srgb"},
+};
+constexpr const auto& enum_table(TexelSpace) { return k_texel_space_names; }
+
 class Texture {
   public:
     /// Requires: at least one pixel, 1 to 4 channels.
-    Texture(TextureUsage usage, const Image8& image);
+    Texture(TextureUsage usage, const Image8& image, TexelSpace space = TexelSpace::linear);
 
     [[nodiscard]] Rgb eval(Vec2 uv) const;  ///< Linear colour; a grey texture gives three equal values.
     [[nodiscard]] float eval_grey(Vec2 uv) const;  ///< In [0, 1]; of a colour texture the luminance.
@@ -47,13 +60,14 @@ class Texture {
 
   private:
     TextureUsage usage_;
+    TexelSpace space_;
     int width_, height_;
     std::size_t tiles_per_row_;
     std::vector<std::uint8_t> texels_;
 };
 
 /// Decodes an image file (PNG, JPEG, TGA, BMP). `name` is for the error sentence.
-[[nodiscard]] Result<Texture> decode_texture(std::string_view bytes, TextureUsage usage,
+[[nodiscard]] Result<Texture> decode_texture(std::string_view bytes, TextureUsage usage, TexelSpace space,
                                              const std::string& name);
 
 }  // namespace pathscope
