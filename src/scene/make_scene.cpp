@@ -194,7 +194,7 @@ void measure_brightness(Scene& scene) {
 
 }  // namespace
 
-Result<Scene> make_scene(const SceneFile& file, SceneParts parts, int threads) {
+Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBuild& build) {
     Scene scene;
     scene.mesh = std::move(parts.mesh);
     scene.materials = std::move(parts.materials);
@@ -213,7 +213,7 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, int threads) {
         scene.bounds.add(Box{sphere.centre - half, sphere.centre + half});
     }
     if (auto fits = check_size(scene); !fits) return fits.error();
-    scene.bvh = build_bvh(scene.mesh, {}, threads);
+    scene.tree = build_tree(scene.mesh, build.tree, build.threads);
 
     add_triangle_lights(scene);
     add_sphere_lights(scene);

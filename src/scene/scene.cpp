@@ -42,10 +42,6 @@ SceneHit hit_on_mesh(const Scene& scene, const Hit& found) {
     return hit;
 }
 
-}  // namespace
-
-namespace detail {
-
 std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& hit) {
     if (!scene.spheres.empty()) {
         Ray rest = ray;
@@ -57,7 +53,16 @@ std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray, const s
     return hit_on_mesh(scene, *hit);
 }
 
-}  // namespace detail
+/// The holes of cut-outs, for a traversal. Scenes without any need not ask.
+struct Solid {
+    const Scene& scene;
+
+    bool operator()(std::uint32_t triangle, float u, float v) const {
+        return is_solid(scene, triangle, u, v);
+    }
+};
+
+}  // namespace
 
 bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v) {
     const Material& material = scene.materials[scene.mesh.material_of(triangle)];
@@ -65,15 +70,19 @@ bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v) {
 }
 
 std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
-    NullTraversalProbe probe;
-    return intersect(scene, ray, probe);
+    return complete_hit(
+        scene, ray,
+        scene.has_cutouts ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray));
+}
+
+std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts) {
+    return complete_hit(scene, ray,
+                        scene.has_cutouts ? closest_hit(scene.tree, ray, Solid{scene}, counts)
+                                          : closest_hit(scene.tree, ray, AcceptAll{}, counts));
 }
 
 bool occluded(const Scene& scene, const Ray& ray) {
-    const auto solid = [&scene](std::uint32_t triangle, float u, float v) {
-        return is_solid(scene, triangle, u, v);
-    };
-    if (scene.has_cutouts ? any_hit(scene.bvh, ray, solid) : any_hit(scene.bvh, ray)) return true;
+    if (scene.has_cutouts ? any_hit(scene.tree, ray, Solid{scene}) : any_hit(scene.tree, ray)) return true;
     for (const Sphere& sphere : scene.spheres)
         if (intersect_sphere(ray, sphere.centre, sphere.radius)) return true;
     return false;

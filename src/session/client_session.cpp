@@ -130,7 +130,8 @@ Result<void> ClientSession::start_local_servers() {
             config_.server_program,
             {"--connect", config_.host, "--ports",
              fmt::format("{},{},{}", config_.ports[0], config_.ports[1], config_.ports[2]), "--threads",
-             std::to_string(config_.local_server_threads), "--name", name, "--quiet"});
+             std::to_string(config_.local_server_threads), "--name", name, "--bvh",
+             std::string(name_of(config_.tree)), "--quiet"});
         if (!process) return process.error();
         local_servers_.push_back({std::move(*process), name});
     }

@@ -309,7 +309,7 @@ void ServerSession::begin_loading() {
         ManifestFiles files(manifest, [this](const Digest& hash) { return cache_.path_of(hash); });
         Result<SceneParts> parts = load_scene_parts(state.scene, files, state.options);
         if (!parts) return loaded_.put({state, parts.error()});
-        Result<Scene> scene = make_scene(state.scene, std::move(*parts), config_.threads);
+        Result<Scene> scene = make_scene(state.scene, std::move(*parts), {config_.threads, config_.tree});
         if (!scene) return loaded_.put({state, scene.error()});
         loaded_.put({state, std::shared_ptr<const Scene>(std::make_shared<Scene>(std::move(*scene)))});
     });

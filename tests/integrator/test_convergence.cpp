@@ -41,7 +41,7 @@ TEST_CASE("textbook and best converge to the same image, on the Cornell box and 
         for (LightSpec& light : opened.file.lights)
             if (auto* sphere = std::get_if<SphereLightSpec>(&light))
                 sphere->radius = std::max(sphere->radius, 0.4f);
-        const Scene scene = *make_scene(opened.file, opened.parts, 0);
+        const Scene scene = *make_scene(opened.file, opened.parts, {.threads = 0});
         const Camera view = opened.file.cameras.front().view;
         const int size = 4, samples = k_sanitized ? 3000 : 60'000;
         const auto best = small_picture(scene, view, make_settings(Setting::best), size, samples);

@@ -51,7 +51,7 @@ inline Scene small_scene(SceneParts parts, std::vector<LightSpec> lights = {}) {
     SceneFile file;
     file.name = "small";
     file.lights = std::move(lights);
-    auto scene = make_scene(file, std::move(parts), 1);
+    auto scene = make_scene(file, std::move(parts), {.threads = 1});
     CHECK(scene, scene.error().message);
     return *std::move(scene);
 }

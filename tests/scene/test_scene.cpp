@@ -160,14 +160,14 @@ TEST_CASE("bounds hold mesh, quads and spheres; an empty scene has a disc for th
 TEST_CASE("what cannot be computed with is refused in a sentence") {
     SceneFile file;
     file.lights = {SphereLightSpec{{0, 1e20f, 0}, 1, k_white}};
-    const auto huge = make_scene(file, empty_parts(), 1);
+    const auto huge = make_scene(file, empty_parts(), {.threads = 1});
     REQUIRE_FALSE(huge);
     CHECK(huge.error().message.find("scale it down") != std::string::npos);
 
     file.lights = {EnvmapSpec{"night.hdr", 1, 0}};
     SceneParts parts = empty_parts();
     parts.envmap = Image(4, 2);
-    const auto black = make_scene(file, std::move(parts), 1);
+    const auto black = make_scene(file, std::move(parts), {.threads = 1});
     REQUIRE_FALSE(black);
     CHECK(black.error().message.starts_with("night.hdr: "));
 }

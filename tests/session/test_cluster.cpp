@@ -29,7 +29,7 @@ struct SmallJob {
     RenderState state;
 
     explicit SmallJob(std::uint32_t spp = 8) : opened(*open_scene("scenes/cornell/scene.json", {})) {
-        scene = std::make_shared<const Scene>(*make_scene(opened.file, opened.parts, 1));
+        scene = std::make_shared<const Scene>(*make_scene(opened.file, opened.parts, {.threads = 1}));
         state.scene = opened.file;
         state.camera = opened.file.cameras.front().view;
         state.settings.width = 70;

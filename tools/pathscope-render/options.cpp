@@ -113,6 +113,7 @@ void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) 
     app.add_option("--round", client.round_samples, "samples per pixel in one round (4)")
         ->check(CLI::Range(1, 4096))
         ->type_name("N");
+    add_lever(app, "--bvh", client.tree, "which tree finds hits");
     app.add_option("--threads", client.threads, "of the client's own rendering; 0 = all cores (0)")
         ->check(CLI::Range(0, 1024))
         ->type_name("N");

@@ -132,7 +132,8 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     Result<OpenedScene> opened = open_scene(options.scene, options.scene_options);
     if (!opened) return opened.error();
     const TimeNs loaded = monotonic_now();
-    Result<Scene> scene = make_scene(opened->file, std::move(opened->parts), options.client.threads);
+    Result<Scene> scene =
+        make_scene(opened->file, std::move(opened->parts), {options.client.threads, options.client.tree});
     if (!scene) return scene.error();
     const TimeNs built = monotonic_now();
     const Result<RenderState> state = make_state(options, opened->file, *scene);

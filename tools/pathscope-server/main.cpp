@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
     app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
         ->check(CLI::Range(0, 1024))
         ->type_name("N");
+    add_lever(app, "--bvh", config.tree, "which tree finds hits");
     app.add_option("--speed-cap", config.samples_per_second,
                    "render no faster, in samples per second; 0 = no cap (0)")
         ->check(CLI::Range(0.0, 1e12))

@@ -57,6 +57,11 @@ struct TriangleHit {
 [[nodiscard]] std::optional<TriangleHit> intersect_triangle(const TriangleRay& ray, const Corner& a,
                                                             const Corner& b, const Corner& c, float t_max);
 
+/// The same for a triangle that is known not to be degenerate: trees leave out those that are.
+[[nodiscard]] std::optional<TriangleHit> intersect_proper_triangle(const TriangleRay& ray, const Corner& a,
+                                                                   const Corner& b, const Corner& c,
+                                                                   float t_max);
+
 /// The same for a single test.
 [[nodiscard]] inline std::optional<TriangleHit> intersect_triangle(const Ray& ray,
                                                                    const TriangleCorners& triangle) {
@@ -89,8 +94,8 @@ inline TriangleRay::TriangleRay(const Ray& ray) : t_min(ray.t_min) {
     shear_y = ray.direction[y] * inverse_z;
 }
 
-inline std::optional<TriangleHit> intersect_triangle(const TriangleRay& ray, const Corner& a, const Corner& b,
-                                                     const Corner& c, float t_max) {
+inline std::optional<TriangleHit> intersect_proper_triangle(const TriangleRay& ray, const Corner& a,
+                                                            const Corner& b, const Corner& c, float t_max) {
     const double a_z = a[ray.z] - ray.origin_z;
     const double b_z = b[ray.z] - ray.origin_z;
     const double c_z = c[ray.z] - ray.origin_z;
@@ -113,10 +118,16 @@ inline std::optional<TriangleHit> intersect_triangle(const TriangleRay& ray, con
     const double inverse_sum = 1.0 / sum;
     const auto t = static_cast<float>((u * a_z + v * b_z + w * c_z) * inverse_sum * ray.inverse_z);
     if (!(t >= ray.t_min && t <= t_max)) return std::nullopt;
-
-    // Corners on one line can be spread by the rounding of the shear; this is the exact answer.
-    if (is_degenerate({{a[0], a[1], a[2]}, {b[0], b[1], b[2]}, {c[0], c[1], c[2]}})) return std::nullopt;
     return TriangleHit{t, static_cast<float>(v * inverse_sum), static_cast<float>(w * inverse_sum)};
+}
+
+inline std::optional<TriangleHit> intersect_triangle(const TriangleRay& ray, const Corner& a, const Corner& b,
+                                                     const Corner& c, float t_max) {
+    const auto hit = intersect_proper_triangle(ray, a, b, c, t_max);
+    // Corners on one line can be spread by the rounding of the shear; this is the exact answer.
+    if (hit && is_degenerate({{a[0], a[1], a[2]}, {b[0], b[1], b[2]}, {c[0], c[1], c[2]}}))
+        return std::nullopt;
+    return hit;
 }
 
 }  // namespace pathscope

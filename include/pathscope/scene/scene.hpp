@@ -18,8 +18,7 @@
 #include <optional>
 #include <vector>
 
-#include "pathscope/bvh/bvh.hpp"
-#include "pathscope/bvh/traverse.hpp"
+#include "pathscope/bvh/tree.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/geometry/hit.hpp"
 #include "pathscope/geometry/mesh.hpp"
@@ -45,7 +44,7 @@ struct Scene {
     std::vector<Sphere> spheres;
     std::vector<Material> materials;
     std::vector<Texture> textures;
-    Bvh bvh;
+    Tree tree;
     LightTable lights;
     Box bounds;                ///< Of mesh and spheres.
     bool has_cutouts = false;  ///< Else rays need not ask.
@@ -53,12 +52,17 @@ struct Scene {
     float typical_radiance = 0, brightest_radiance = 0;
 };
 
-/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. `threads`:
-/// 0 = all cores; the result does not depend on it. Materials emit if the file lists emissive_mtl, or no
+/// How to build; no part of what the scene looks like.
+struct SceneBuild {
+    int threads = 0;  ///< 0 = all cores; the result does not depend on it.
+    TreeKind tree = TreeKind::wide;
+};
+
+/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. Materials emit if the file lists emissive_mtl, or no
 /// light at all (a bare .obj). A scene without light is black, and said to be, but is no error.
 /// Refuses an environment map that is none, and a scene too large for floats. Requires: lights as
 /// parse_scene_file gives them, parts as load_scene_parts does.
-[[nodiscard]] Result<Scene> make_scene(const SceneFile& file, SceneParts parts, int threads = 0);
+[[nodiscard]] Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBuild& build = {});
 
 inline constexpr std::uint32_t k_no_triangle = 0xffffffffu;
 
@@ -74,9 +78,8 @@ struct SceneHit {
 /// Whether anything lies in [t_min, t_max] of the ray.
 [[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);
 
-/// The same, seen by a probe (bvh/traversal_probe.hpp): for the traversal-cost buffer, and to step through.
-template <class Probe>
-[[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, Probe& probe);
+/// intersect(), counted: for the traversal-cost buffer.
+[[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts);
 
 /// What the surface sends towards `outgoing` by itself. Zero for all but emitters.
 [[nodiscard]] Rgb emitted_radiance(const Scene& scene, const SceneHit& hit, Vec3 outgoing);
@@ -89,22 +92,5 @@ template <class Probe>
 
 /// Half the diagonal of Scene::bounds; 1 if that is 0, so that light from infinity has a disc to fall on.
 [[nodiscard]] float scene_radius(const Scene& scene);
-
-// ---- Inline, for the probe to be compiled in.
-
-namespace detail {
-[[nodiscard]] std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray,
-                                                   const std::optional<Hit>& hit);
-}
-
-template <class Probe>
-std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, Probe& probe) {
-    const auto solid = [&scene](std::uint32_t triangle, float u, float v) {
-        return is_solid(scene, triangle, u, v);
-    };
-    return detail::complete_hit(scene, ray,
-                                scene.has_cutouts ? closest_hit(scene.bvh, ray, solid, probe)
-                                                  : closest_hit(scene.bvh, ray, AcceptAll{}, probe));
-}
 
 }  // namespace pathscope

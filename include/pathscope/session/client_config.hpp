@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "pathscope/bvh/tree.hpp"
 #include "pathscope/cluster/failure_detector.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
@@ -34,8 +35,9 @@ struct ClientConfig {
     int block_size = 32;
     std::uint32_t round_samples = 4;
 
-    int threads = 0;        ///< Of the client's own rendering; 0 = all cores.
-    TimeNs time_limit = 0;  ///< Stop handing out rounds then; 0 = none.
+    int threads = 0;                 ///< Of the client's own rendering; 0 = all cores.
+    TreeKind tree = TreeKind::wide;  ///< Of the scene that the local servers build.
+    TimeNs time_limit = 0;           ///< Stop handing out rounds then; 0 = none.
 };
 
 }  // namespace pathscope

@@ -1,0 +1,69 @@
+#pragma once
+/// Which triangle does a ray meet first, and does it meet any: for the wide tree.
+///
+/// The text of the walk is src/bvh/wide_kernel.hpp; it is compiled once for each instruction set, and the one that suits
+/// the machine is chosen when the program starts (math/simd_level.hpp).
+///
+/// Ensures, Requires: as traverse.hpp. The answers are the same bits with every instruction set, and the same as those of
+/// the binary tree.
+/// Thread safety: pure, as far as the filter is.
+/// Test: tests/bvh/test_wide.cpp (against brute force and the binary tree, at each level of instructions)
+
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+
+#include "pathscope/bvh/traversal_probe.hpp"
+#include "pathscope/bvh/traverse.hpp"
+#include "pathscope/bvh/wide_bvh.hpp"
+#include "pathscope/geometry/hit.hpp"
+#include "pathscope/math/ray.hpp"
+#include "pathscope/math/simd_level.hpp"
+
+namespace pathscope {
+
+/// Which hits count: a function that crosses the border between instruction sets, asked only for hits of single triangles.
+struct HitFilter {
+    bool (*accept)(const void* context, std::uint32_t triangle, float u, float v) = nullptr;  ///< Null: all.
+    const void* context = nullptr;
+
+    [[nodiscard]] bool operator()(std::uint32_t triangle, float u, float v) const {
+        return !accept || accept(context, triangle, u, v);
+    }
+};
+
+/// From anything that can be called as accept(triangle, u, v) of traverse.hpp. It must outlive the query.
+template <class Accept>
+[[nodiscard]] HitFilter hit_filter(const Accept& accept) {
+    if constexpr (std::is_same_v<Accept, AcceptAll>) return {};
+    return {[](const void* context, std::uint32_t triangle, float u, float v) -> bool {
+                return (*static_cast<const Accept*>(context))(triangle, u, v);
+            },
+            &accept};
+}
+
+/// The walk for one instruction set.
+struct WideKernel {
+    std::optional<Hit> (*closest_hit)(const WideBvh&, const Ray&, HitFilter);
+    bool (*any_hit)(const WideBvh&, const Ray&, HitFilter);
+    std::optional<Hit> (*count_closest_hit)(const WideBvh&, const Ray&, HitFilter, TraversalCounts&);
+    bool (*count_any_hit)(const WideBvh&, const Ray&, HitFilter, TraversalCounts&);
+};
+
+/// Requires: level <= highest_simd_level().
+[[nodiscard]] const WideKernel& wide_kernel(SimdLevel level);
+
+namespace detail {
+extern const WideKernel& k_wide_kernel;  ///< That of simd_level().
+}
+
+[[nodiscard]] inline std::optional<Hit> closest_hit(const WideBvh& bvh, const Ray& ray,
+                                                    HitFilter filter = {}) {
+    return detail::k_wide_kernel.closest_hit(bvh, ray, filter);
+}
+
+[[nodiscard]] inline bool any_hit(const WideBvh& bvh, const Ray& ray, HitFilter filter = {}) {
+    return detail::k_wide_kernel.any_hit(bvh, ray, filter);
+}
+
+}  // namespace pathscope

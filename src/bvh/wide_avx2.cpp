@@ -1,0 +1,24 @@
+#if defined(__x86_64__)
+
+// All that is shared with other instruction sets comes first.
+#include <immintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "bvh/wide_kernels.hpp"
+#include "pathscope/bvh/box_ray.hpp"
+#include "pathscope/bvh/wide_traverse.hpp"
+#include "pathscope/geometry/triangle.hpp"
+#include "pathscope/math/simd_level.hpp"
+
+#pragma GCC target("avx2,fma,bmi")
+#define PATHSCOPE_SIMD avx2
+#include "bvh/wide_kernel.hpp"
+
+namespace pathscope {
+const WideKernel& wide_kernel_avx2() { return avx2::k_kernel; }
+}  // namespace pathscope
+
+#endif

@@ -1,0 +1,25 @@
+#if defined(__x86_64__)
+
+// All that is shared with other instruction sets comes first.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // GCC 12 warns of its own header (its bug 105593).
+#include <immintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "bvh/wide_kernels.hpp"
+#include "pathscope/bvh/box_ray.hpp"
+#include "pathscope/bvh/wide_traverse.hpp"
+#include "pathscope/geometry/triangle.hpp"
+#include "pathscope/math/simd_level.hpp"
+
+#pragma GCC target("avx2,fma,bmi,avx512f,avx512vl")
+#define PATHSCOPE_SIMD avx512
+#include "bvh/wide_kernel.hpp"
+
+namespace pathscope {
+const WideKernel& wide_kernel_avx512() { return avx512::k_kernel; }
+}  // namespace pathscope
+
+#endif

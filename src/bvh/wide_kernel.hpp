@@ -1,0 +1,271 @@
+#pragma once
+/// The walk through the wide tree. Included by one source file for each instruction set, after that file has chosen it:
+/// wide_portable.cpp, wide_avx2.cpp, wide_avx512.cpp.
+
+#include "pathscope/bvh/box_ray.hpp"
+#include "pathscope/bvh/wide_traverse.hpp"
+#include "pathscope/core/check.hpp"
+#include "pathscope/geometry/triangle.hpp"
+#include "pathscope/math/simd.hpp"
+
+namespace pathscope {
+inline namespace PATHSCOPE_SIMD {
+
+// ---- Eight boxes.
+
+/// BoxRay (bvh/box_ray.hpp) in vector registers.
+struct WideBoxRay {
+    struct Slab {
+        Float8 near_origin, far_origin, inverse;
+        std::size_t near, far;  ///< Where the planes lie in WideNode::bounds, in floats.
+    };
+    Slab x, y, z;
+    Float8 t_min;
+
+    WideBoxRay(const BoxRay& ray, float least)
+        : x(slab(ray, 0, ray.x)), y(slab(ray, 1, ray.y)), z(slab(ray, 2, ray.z)), t_min(broadcast(least)) {}
+
+  private:
+    static Slab slab(const BoxRay& ray, int axis, SlabPlanes planes) {
+        return {broadcast(ray.near_origin[axis]), broadcast(ray.far_origin[axis]),
+                broadcast(ray.inverse[axis]), planes.near * k_wide, planes.far * k_wide};
+    }
+};
+
+/// As intersect_box(), for the eight children of a node. Returns those that are met, and where.
+[[nodiscard]] inline Lanes intersect_children(const WideNode& node, const WideBoxRay& ray, float t_max,
+                                              Float8& t_near) {
+    const float* const planes = node.bounds[0].data();
+    const auto near = [&](const WideBoxRay::Slab& slab) {
+        return (load(planes + slab.near) - slab.near_origin) * slab.inverse;
+    };
+    const auto far = [&](const WideBoxRay::Slab& slab) {
+        return (load(planes + slab.far) - slab.far_origin) * slab.inverse;
+    };
+    t_near = max(max(near(ray.x), near(ray.y)), max(near(ray.z), ray.t_min));
+    const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max)));
+    return at_most(t_near, t_far * broadcast(k_far_stretch));
+}
+
+// ---- Eight triangles.
+
+/// a b - c d with the exact sign, as difference_of_products() of geometry/triangle.hpp.
+[[nodiscard]] inline Double8 difference_of_products(Double8 a, Double8 b, Double8 c, Double8 d) {
+    const Double8 ab = a * b, cd = c * d;
+    const Lanes cancel = equal(ab, cd);
+    if (!any(cancel)) [[likely]]
+        return ab - cd;
+    return select(cancel, fused_multiply_subtract(a, b, ab) - fused_multiply_subtract(c, d, cd), ab - cd);
+}
+
+struct BlockHits {
+    alignas(32) std::array<float, k_wide> t, u, v;
+};
+
+/// As intersect_proper_triangle(), step by step and bit by bit, for the eight triangles of a block. Returns those that are
+/// hit; `hits` is written in those lanes only.
+[[nodiscard]] inline Lanes intersect_triangles(const TriangleBlock& block, const TriangleRay& ray,
+                                               float t_max, BlockHits& hits) {
+    struct Sheared {
+        Double8 x, y, z;
+    };
+    const auto shear = [&](std::size_t corner) {
+        const auto& axes = block.corners[corner];
+        const auto from_origin = [&](int axis, double origin) {
+            return widen(load(axes[static_cast<std::size_t>(axis)].data())) - broadcast(origin);
+        };
+        const Double8 z = from_origin(ray.z, ray.origin_z);
+        return Sheared{from_origin(ray.x, ray.origin_x) - broadcast(ray.shear_x) * z,
+                       from_origin(ray.y, ray.origin_y) - broadcast(ray.shear_y) * z, z};
+    };
+    const Sheared a = shear(0), b = shear(1), c = shear(2);
+
+    const Double8 u = difference_of_products(c.x, b.y, c.y, b.x);
+    const Double8 v = difference_of_products(a.x, c.y, a.y, c.x);
+    const Double8 w = difference_of_products(b.x, a.y, b.y, a.x);
+    const Double8 zero = broadcast(0.0);
+    const Lanes inside = at_most(zero, min(u, min(v, w))) | at_most(max(u, max(v, w)), zero);
+    if (!any(inside)) return 0;
+
+    const Double8 sum = u + v + w;
+    const Double8 inverse_sum = broadcast(1.0) / sum;  // Infinite where the triangle is seen edge-on.
+    const Float8 t = narrow((u * a.z + v * b.z + w * c.z) * inverse_sum * broadcast(ray.inverse_z));
+    const Lanes hit =
+        inside & ~equal(sum, zero) & at_most(broadcast(ray.t_min), t) & at_most(t, broadcast(t_max));
+    if (!any(hit)) return 0;
+    store(hits.t.data(), t);
+    store(hits.u.data(), narrow(v * inverse_sum));
+    store(hits.v.data(), narrow(w * inverse_sum));
+    return hit;
+}
+
+/// Calls found(triangle, hit) for each triangle of the block that the ray meets, until it returns true.
+template <class Found, class Probe>
+[[nodiscard]] inline bool intersect_block(const TriangleBlock& block, const TriangleRay& ray, float t_max,
+                                          Found&& found, Probe& probe) {
+    for (const std::uint32_t triangle : block.triangles)
+        probe.test_triangle(triangle, TriangleOutcome::missed, t_max);
+    BlockHits hits;
+    for (Lanes lanes = intersect_triangles(block, ray, t_max, hits); any(lanes);
+         lanes = without_first(lanes)) {
+        const auto lane = static_cast<std::size_t>(first(lanes));
+        if (found(block.triangles[lane], TriangleHit{hits.t[lane], hits.u[lane], hits.v[lane]})) return true;
+    }
+    return false;
+}
+
+// ---- The walk.
+
+/// Children that wait for their turn, the nearest on top. The bits of a float that is not negative are ordered as the float
+/// is, so distance and child are one number.
+class WideStack {
+  public:
+    using Entry = std::uint64_t;
+
+    [[nodiscard]] static Entry entry(float t_near, std::uint32_t child) {
+        return Entry{std::bit_cast<std::uint32_t>(t_near)} << 32 | child;
+    }
+    [[nodiscard]] static std::uint32_t child_of(Entry entry) { return static_cast<std::uint32_t>(entry); }
+
+    void push(Entry entry) { entries_[size_++] = entry; }
+
+    /// Puts the last `count` entries in order.
+    void sort_top(std::size_t count) {
+        Entry* const begin = entries_.data() + size_ - count;
+        for (std::size_t i = 1; i < count; ++i) {
+            const Entry moving = begin[i];
+            std::size_t place = i;
+            for (; place > 0 && begin[place - 1] < moving; --place) begin[place] = begin[place - 1];
+            begin[place] = moving;
+        }
+    }
+
+    /// The next child that begins before t_max; false if there is none left.
+    [[nodiscard]] bool pop(float t_max, std::uint32_t& child) {
+        const float limit = t_max * k_far_stretch;
+        while (size_ > 0) {
+            const Entry next = entries_[--size_];
+            if (std::bit_cast<float>(static_cast<std::uint32_t>(next >> 32)) > limit) continue;
+            child = child_of(next);
+            return true;
+        }
+        return false;
+    }
+
+  private:
+    std::size_t size_ = 0;
+    std::array<Entry, k_wide_max_depth*(k_wide - 1) + k_wide> entries_;
+};
+
+/// Which of the children that are met comes next; the others wait. Most nodes have one or two: those need no sorting, and no
+/// branch that depends on which of them is the nearer. All of them are on their way from memory at once.
+template <bool ordered>
+[[nodiscard]] inline std::uint32_t choose_child(const WideBvh& bvh, const WideNode& node, Lanes met,
+                                                Float8 t_near, WideStack& stack) {
+    alignas(32) std::array<float, k_wide> distances;
+    store(distances.data(), t_near);
+    const auto take = [&] {
+        const auto i = static_cast<std::size_t>(first(met));
+        met = without_first(met);
+        const std::uint32_t child = node.children[i];
+        child& k_leaf_child ? prefetch(bvh.blocks[child & ~k_leaf_child]) : prefetch(bvh.nodes[child]);
+        return WideStack::entry(distances[i], child);
+    };
+    const WideStack::Entry one = take();
+    if (!any(met)) return WideStack::child_of(one);
+    const WideStack::Entry two = take();
+    const WideStack::Entry nearer = std::min(one, two), farther = std::max(one, two);
+    stack.push(farther);
+    if (!any(met)) return WideStack::child_of(nearer);
+    stack.push(nearer);
+    std::size_t count = 2;
+    for (; any(met); ++count) stack.push(take());
+    if constexpr (ordered) stack.sort_top(count);
+    std::uint32_t child = 0;
+    (void)stack.pop(k_infinity, child);
+    return child;
+}
+
+/// Calls open_block(block) for the blocks that the ray meets before t_max, nearer ones first (as far as boxes tell), until it
+/// returns true. `ordered` = false leaves the order open.
+template <bool ordered, class OpenBlock, class Probe>
+inline void walk(const WideBvh& bvh, const WideBoxRay& ray, const float& t_max, OpenBlock&& open_block,
+                 Probe& probe) {
+    WideStack stack;
+    std::uint32_t current = 0;
+    do {
+        probe.enter_node(current);
+        while (!(current & k_leaf_child)) {
+            const WideNode& node = bvh.nodes[current];
+            Float8 t_near;
+            const Lanes met = intersect_children(node, ray, t_max, t_near);
+            for (std::size_t i = 0; i < k_wide; ++i) probe.test_box(node.children[i], 0, met >> i & 1);
+            if (!any(met)) break;
+            current = choose_child<ordered>(bvh, node, met, t_near, stack);
+            probe.enter_node(current);
+        }
+        if ((current & k_leaf_child) && open_block(bvh.blocks[current & ~k_leaf_child])) return;
+    } while (stack.pop(t_max, current));
+}
+
+template <class Probe>
+[[nodiscard]] inline std::optional<Hit> find_closest(const WideBvh& bvh, const Ray& ray, HitFilter filter,
+                                                     Probe& probe) {
+    if (bvh.empty() || !(ray.t_min <= ray.t_max)) return std::nullopt;
+    const WideBoxRay box_ray(BoxRay(ray, bvh.bounds), ray.t_min);
+    const TriangleRay triangle_ray(ray);
+    float t_max = ray.t_max;
+    std::optional<Hit> closest;
+    const auto keep_closest = [&](std::uint32_t triangle, const TriangleHit& hit) {
+        const bool wins =
+            !closest || hit.t < closest->t || (hit.t == closest->t && triangle < closest->triangle);
+        if (wins && filter(triangle, hit.u, hit.v)) {
+            closest = Hit{hit.t, hit.u, hit.v, triangle};
+            t_max = hit.t;
+        }
+        return false;
+    };
+    const auto open_block = [&](const TriangleBlock& block) {
+        return intersect_block(block, triangle_ray, t_max, keep_closest, probe);
+    };
+    walk<true>(bvh, box_ray, t_max, open_block, probe);
+    return closest;
+}
+
+template <class Probe>
+[[nodiscard]] inline bool find_any(const WideBvh& bvh, const Ray& ray, HitFilter filter, Probe& probe) {
+    if (bvh.empty() || !(ray.t_min <= ray.t_max)) return false;
+    const WideBoxRay box_ray(BoxRay(ray, bvh.bounds), ray.t_min);
+    const TriangleRay triangle_ray(ray);
+    const float t_max = ray.t_max;
+    bool found = false;
+    const auto accept = [&](std::uint32_t triangle, const TriangleHit& hit) {
+        return found = filter(triangle, hit.u, hit.v);
+    };
+    const auto open_block = [&](const TriangleBlock& block) {
+        return intersect_block(block, triangle_ray, t_max, accept, probe);
+    };
+    walk<false>(bvh, box_ray, t_max, open_block, probe);
+    return found;
+}
+
+/// What wide_kernel() hands out.
+inline constexpr WideKernel k_kernel{
+    [](const WideBvh& bvh, const Ray& ray, HitFilter filter) {
+        NullTraversalProbe probe;
+        return find_closest(bvh, ray, filter, probe);
+    },
+    [](const WideBvh& bvh, const Ray& ray, HitFilter filter) {
+        NullTraversalProbe probe;
+        return find_any(bvh, ray, filter, probe);
+    },
+    [](const WideBvh& bvh, const Ray& ray, HitFilter filter, TraversalCounts& counts) {
+        return find_closest(bvh, ray, filter, counts);
+    },
+    [](const WideBvh& bvh, const Ray& ray, HitFilter filter, TraversalCounts& counts) {
+        return find_any(bvh, ray, filter, counts);
+    },
+};
+
+}  // namespace PATHSCOPE_SIMD
+}  // namespace pathscope

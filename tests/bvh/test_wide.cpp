@@ -1,0 +1,245 @@
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "../../src/bvh/binary_tree.hpp"
+#include "../../src/bvh/spatial_split.hpp"
+#include "bvh/oracle.hpp"
+#include "pathscope/bvh/wide_traverse.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+using namespace pathscope::testing;
+
+namespace {
+
+/// With every triangle that can be cut, cut.
+constexpr WideBuildParams k_eager_cuts{.spatial_gain = 0, .extra_references = 4};
+constexpr WideBuildParams k_no_cuts{.spatial_gain = 1};
+
+std::vector<SimdLevel> levels() {
+    std::vector<SimdLevel> levels;
+    for (const auto& entry : k_simd_level_names)
+        if (entry.value <= highest_simd_level()) levels.push_back(entry.value);
+    return levels;
+}
+
+/// Long thin triangles in all directions: what spatial splits are for.
+Mesh needles(int count, std::uint32_t seed) {
+    HashRng rng(seed);
+    Mesh mesh;
+    for (int i = 0; i < count; ++i) {
+        const Vec3 from = random_point(rng, {{0, 0, 0}, {1, 1, 1}});
+        const Vec3 along = random_direction(rng) * rng.next_float();
+        const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+        for (const Vec3 corner : {from, from + along, from + along * 0.5f + random_direction(rng) * 0.02f})
+            mesh.positions.push_back(corner);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return mesh;
+}
+
+Mesh wide_test_mesh(int number) { return number < 3 ? test_mesh(number) : needles(900, 4); }
+
+bool same_bytes(const WideBvh& a, const WideBvh& b) {
+    return a.nodes.size() == b.nodes.size() && a.blocks.size() == b.blocks.size() &&
+           std::memcmp(a.nodes.data(), b.nodes.data(), a.nodes.size() * sizeof(WideNode)) == 0 &&
+           std::memcmp(a.blocks.data(), b.blocks.data(), a.blocks.size() * sizeof(TriangleBlock)) == 0;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "the wide tree's answers are brute force, bit for bit, with every instruction set and every build") {
+    const int rays_per_mesh = k_sanitized ? 2000 : 25000;
+    for (int number = 0; number < 4; ++number) {
+        const Mesh mesh = wide_test_mesh(number);
+        const WideBvh trees[] = {build_wide_bvh(mesh), build_wide_bvh(mesh, k_eager_cuts),
+                                 build_wide_bvh(mesh, k_no_cuts)};
+        RayMaker rays(mesh, 10 + static_cast<std::uint32_t>(number));
+        int hits = 0, differ = 0;
+        for (int i = 0; i < rays_per_mesh; ++i) {
+            const Ray ray = rays.next();
+            if (is_zero_direction(ray)) continue;
+            const std::optional<Hit> expected = brute_force(mesh, ray);
+            hits += expected.has_value();
+            for (const SimdLevel level : levels())
+                for (const WideBvh& tree : trees) {
+                    differ += wide_kernel(level).closest_hit(tree, ray, {}) != expected;
+                    differ += wide_kernel(level).any_hit(tree, ray, {}) != expected.has_value();
+                }
+        }
+        CAPTURE(number);
+        CHECK(differ == 0);
+        CHECK(hits > rays_per_mesh / 20);
+        CHECK(hits < rays_per_mesh);
+    }
+}
+
+TEST_CASE("the same far from the origin of space, very small and very large") {
+    for (int number = 0; number < 4; ++number)
+        for (const float scale : {1e-12f, 1e-3f, 1e5f, 1e12f}) {
+            const Mesh mesh =
+                scaled_and_moved(wide_test_mesh(number), scale, Vec3{0.7f, -0.4f, 0.59f} * (1000 * scale));
+            const WideBvh bvh = build_wide_bvh(mesh, k_eager_cuts);
+            RayMaker rays(mesh, 20 + static_cast<std::uint32_t>(number));
+            int differ = 0;
+            for (int i = 0; i < 2000; ++i) {
+                const Ray ray = rays.next();
+                if (is_zero_direction(ray)) continue;
+                const std::optional<Hit> expected = brute_force(mesh, ray);
+                for (const SimdLevel level : levels()) {
+                    differ += wide_kernel(level).closest_hit(bvh, ray, {}) != expected;
+                    differ += wide_kernel(level).any_hit(bvh, ray, {}) != expected.has_value();
+                }
+            }
+            CAPTURE(number);
+            CAPTURE(scale);
+            CHECK(differ == 0);
+        }
+}
+
+TEST_CASE("the filter is honoured: holes are seen through") {
+    const auto checkered = [](std::uint32_t triangle, float u, float v) {
+        return (static_cast<int>(u * 4) + static_cast<int>(v * 4) + static_cast<int>(triangle)) % 2 == 0;
+    };
+    for (int number = 0; number < 4; ++number) {
+        const Mesh mesh = wide_test_mesh(number);
+        const WideBvh bvh = build_wide_bvh(mesh);
+        RayMaker rays(mesh, 30 + static_cast<std::uint32_t>(number));
+        int differ = 0, seen_through = 0;
+        for (int i = 0; i < 3000; ++i) {
+            const Ray ray = rays.next();
+            if (is_zero_direction(ray)) continue;
+            const std::optional<Hit> expected = brute_force(mesh, ray, checkered);
+            for (const SimdLevel level : levels()) {
+                differ += wide_kernel(level).closest_hit(bvh, ray, hit_filter(checkered)) != expected;
+                differ += wide_kernel(level).any_hit(bvh, ray, hit_filter(checkered)) != expected.has_value();
+            }
+            seen_through += closest_hit(bvh, ray) != expected;
+        }
+        CHECK(differ == 0);
+        CHECK(seen_through > 50);
+    }
+}
+
+TEST_CASE("of coincident triangles the lowest number counts") {
+    Mesh mesh;
+    for (int i = 0; i < 40; ++i) add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+    const WideBvh bvh = build_wide_bvh(mesh);
+    CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}})->triangle == 0);
+    CHECK(closest_hit(bvh, {{0.2f, 0.7f, 1}, {0, 0, -1}})->triangle == 1);
+    CHECK(closest_hit(bvh, {{0.5f, 0.5f, 1}, {0, 0, -1}})->triangle == 0);  // On the diagonal: both.
+    const auto not_the_first = [](std::uint32_t triangle, float, float) { return triangle > 4; };
+    CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}}, hit_filter(not_the_first))->triangle == 6);
+}
+
+TEST_CASE("an empty mesh, an empty interval, and directions that are none meet nothing") {
+    const WideBvh empty = build_wide_bvh(Mesh{});
+    CHECK_FALSE(closest_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
+    CHECK_FALSE(any_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
+
+    const WideBvh sphere = build_wide_bvh(bumpy_sphere(3, 2));
+    CHECK(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}}));
+    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
+    CHECK_FALSE(closest_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
+    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 0}}));
+    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, std::nanf(""), 1}}));
+    CHECK_FALSE(closest_hit(sphere, {{std::nanf(""), 0, 0}, {0, 0, 1}}));
+}
+
+TEST_CASE("the tree is the same, byte for byte, for any number of threads") {
+    const Mesh mesh = needles(20000, 8);  // More than one subtree.
+    const WideBvh one = build_wide_bvh(mesh, {}, 1);
+    CHECK(same_bytes(one, build_wide_bvh(mesh, {}, 2)));
+    CHECK(same_bytes(one, build_wide_bvh(mesh, {}, 5)));
+}
+
+TEST_CASE("every triangle is in a block, each block is reached once, and cuts pay") {
+    const Mesh mesh = needles(3000, 9);
+    const auto check = [&](const WideBuildParams& params) {
+        const WideBvh bvh = build_wide_bvh(mesh, params);
+        std::set<std::uint32_t> triangles, blocks;
+        std::size_t children = 0;
+        for (const WideNode& node : bvh.nodes)
+            for (std::size_t i = 0; i < k_wide; ++i)
+                if (node.bounds[0][i] <= node.bounds[3][i]) {
+                    ++children;
+                    if (node.children[i] & k_leaf_child) blocks.insert(node.children[i] & ~k_leaf_child);
+                }
+        for (const TriangleBlock& block : bvh.blocks)
+            for (std::size_t lane = 0; lane < k_wide; ++lane)
+                if (!std::isnan(block.corners[0][0][lane])) triangles.insert(block.triangles[lane]);
+        CHECK(triangles.size() == 3000);
+        CHECK(blocks.size() == bvh.blocks.size());
+        CHECK(children == bvh.nodes.size() - 1 + bvh.blocks.size());
+        return wide_bvh_stats(bvh, params);
+    };
+    const WideBvhStats cut = check({}), whole = check(k_no_cuts);
+    CHECK(whole.references == 3000);
+    CHECK(cut.references > 3000);
+    CHECK(cut.references <= 4500);  // extra_references
+    CHECK(cut.cost < whole.cost);
+}
+
+TEST_CASE("no other choice of eight children is cheaper: all of them, for small trees") {
+    // Brute force over every way to open children, on trees of few leaves, where it can be afforded.
+    struct Search {
+        const BinaryTree& tree;
+        double best(std::uint32_t number, std::size_t places) const {  // A forest of `places` trees at most.
+            const BinaryNode& node = tree.nodes[number];
+            double least = single(number);
+            if (!node.is_leaf())
+                for (std::size_t i = 1; i < places; ++i)
+                    least = std::min(least, best(node.left, i) + best(node.left + 1, places - i));
+            return least;
+        }
+        double single(std::uint32_t number) const {
+            const BinaryNode& node = tree.nodes[number];
+            const double area = node.box.half_area();
+            double least = node.count <= k_wide ? area : 1e30;
+            if (!node.is_leaf())
+                for (std::size_t i = 1; i < k_wide; ++i)
+                    least = std::min(least, area + best(node.left, i) + best(node.left + 1, k_wide - i));
+            return least;
+        }
+    };
+    for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+        const Mesh mesh = random_soup(24, seed);
+        const BinaryTree tree = build_binary_tree(mesh, k_no_cuts, 1);
+        const WideBvhStats stats = wide_bvh_stats(collapse(tree, mesh, k_no_cuts), k_no_cuts);
+        const double expected = Search{tree}.single(0) / tree.nodes[0].box.half_area();
+        CHECK(stats.cost == doctest::Approx(expected).epsilon(1e-5));
+    }
+}
+
+TEST_CASE("the two parts of a reference that is cut hold all of the triangle in its box") {
+    HashRng rng(11);
+    const Mesh mesh = random_soup(2000, 12);
+    int points = 0, lost = 0;
+    for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
+        const TriangleCorners triangle = corners(mesh, i);
+        const Box box = bounds(triangle);
+        const int axis = static_cast<int>(rng.next_u32() % 3);
+        const float plane = lerp(box.low[axis], box.high[axis], rng.next_float());
+        if (!(box.low[axis] < plane && plane < box.high[axis])) continue;
+        const CutReference parts = cut(mesh, {box.low, i, box.high, 0}, axis, plane);
+        CHECK(parts.left.high[axis] <= plane);
+        CHECK(parts.right.low[axis] >= plane);
+        const auto holds = [](const Reference& part, Vec3 p) {
+            const float e = 1e-6f;  // The test's own rounding.
+            return p.x >= part.low.x - e && p.y >= part.low.y - e && p.z >= part.low.z - e &&
+                   p.x <= part.high.x + e && p.y <= part.high.y + e && p.z <= part.high.z + e;
+        };
+        for (int k = 0; k < 50; ++k) {
+            float u = rng.next_float(), v = rng.next_float();
+            if (u + v > 1) u = 1 - u, v = 1 - v;
+            const Vec3 p = triangle.at(u, v);
+            ++points;
+            lost += !(p[axis] <= plane ? holds(parts.left, p) : holds(parts.right, p));
+        }
+    }
+    CHECK(points > 50000);
+    CHECK(lost == 0);
+}

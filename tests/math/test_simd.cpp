@@ -1,0 +1,60 @@
+#include "pathscope/math/simd.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "pathscope/math/random.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+
+// The versions for AVX are compared with this one, bit by bit, by the users of the header (tests/bvh/test_wide.cpp).
+
+TEST_CASE("names of levels can be read back, and the level in use is one that the machine has") {
+    for (const auto& entry : k_simd_level_names)
+        CHECK(from_name<SimdLevel>(name_of(entry.value)) == entry.value);
+    CHECK(simd_level() <= highest_simd_level());
+}
+
+TEST_CASE("lanes are walked from the lowest") {
+    Lanes lanes = 0b10010100;
+    for (const int expected : {2, 4, 7}) {
+        REQUIRE(any(lanes));
+        CHECK(first(lanes) == expected);
+        lanes = without_first(lanes);
+    }
+    CHECK_FALSE(any(lanes));
+}
+
+TEST_CASE("arithmetic is that of single floats and doubles, lane by lane") {
+    HashRng rng(3);
+    for (int round = 0; round < 1000; ++round) {
+        alignas(32) std::array<float, 8> a, b, sum, product, narrowed;
+        for (std::size_t i = 0; i < 8; ++i) a[i] = rng.next_float() - 0.5f, b[i] = rng.next_float() - 0.5f;
+        const Float8 x = load(a.data()), y = load(b.data());
+        store(sum.data(), x + y);
+        store(product.data(), x * y - y);
+        const Double8 quotient = widen(x) / (widen(y) - broadcast(2.0));
+        store(narrowed.data(), narrow(select(0b00001111, quotient, widen(y))));
+        const Lanes at_most_lanes = at_most(x, y);
+        for (std::size_t i = 0; i < 8; ++i) {
+            CHECK(sum[i] == a[i] + b[i]);
+            CHECK(product[i] == a[i] * b[i] - b[i]);
+            CHECK(narrowed[i] == (i < 4 ? float(double(a[i]) / (double(b[i]) - 2)) : b[i]));
+            CHECK((at_most_lanes >> i & 1) == (a[i] <= b[i]));
+        }
+    }
+}
+
+TEST_CASE("comparisons with NaN are false; of NaN and a number, min and max return the second") {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    CHECK(at_most(broadcast(nan), broadcast(1.0f)) == 0);
+    CHECK(at_most(broadcast(1.0f), broadcast(nan)) == 0);
+    CHECK(equal(broadcast(double(nan)), broadcast(double(nan))) == 0);
+    alignas(32) std::array<float, 8> out;
+    store(out.data(), min(broadcast(nan), broadcast(2.0f)));
+    CHECK(out[5] == 2);
+    store(out.data(), max(broadcast(2.0f), broadcast(nan)));
+    CHECK(std::isnan(out[5]));
+}
