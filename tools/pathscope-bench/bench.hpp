@@ -15,17 +15,17 @@
 
 namespace pathscope::bench {
 
+/// What the command line says. Where it says nothing, each benchmark has a default of its own.
 struct BenchOptions {
     std::string name;
     std::filesystem::path json;      ///< Empty: the table on the terminal is all.
     std::filesystem::path scenes;    ///< A folder whose folders hold a scene.json each.
     std::vector<std::string> scene;  ///< Folders of it by name, or paths of scenes.
-    std::vector<int> threads{1};
-    int runs = 5;                        ///< That are counted, after one that is not.
-    std::size_t rays = 1024 * 1024;      ///< bvh: in each set.
-    std::pair<int, int> size{256, 144};  ///< image: in pixels.
-    int spp = 16;                        ///< image: samples per pixel, at most.
-    int reference_spp = 256;             ///< image: of the picture that errors are measured against.
+    std::vector<int> threads;
+    int runs = 5;  ///< That are counted, after one that is not.
+    std::optional<std::size_t> rays;
+    std::optional<std::pair<int, int>> size;  ///< In pixels.
+    std::optional<int> spp, reference_spp;
 };
 
 /// What goes into the JSON beside machine and commit.
@@ -46,6 +46,9 @@ struct Bench {
 [[nodiscard]] std::string bench_names();  ///< "bvh, filter": for help and errors.
 
 [[nodiscard]] Result<Report> bench_bvh(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_filter(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_image(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_ledger(const BenchOptions& options);
 
 /// {"bench", "machine", "commit", "version", "runs", "rows", ...}, as docs/performance.md explains them.
 [[nodiscard]] std::string report_json(const BenchOptions& options, const Report& report);

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include "bench.hpp"
 #include "measure.hpp"
@@ -21,6 +22,8 @@ namespace pathscope::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr std::size_t k_default_rays = 1024 * 1024;  ///< Of each kind.
 
 /// Two trees agree on a ray if both miss, or hit at distances that differ by less than this fraction.
 constexpr float k_same_distance = 1e-3f;
@@ -51,7 +54,7 @@ struct Timing {
 /// Median wall-clock seconds of each tracer; afterwards each holds its tree.
 std::map<const Tracer*, double> build_all(const Rivals& rivals, const Mesh& mesh, int threads, int runs) {
     const std::vector<Tracer*> tracers = rivals.all();
-    std::vector<Measurement> builds;
+    std::vector<std::function<double()>> builds;
     for (Tracer* tracer : tracers)
         builds.push_back([tracer, &mesh, threads] { return tracer->build(mesh, threads); });
     const auto seconds = interleave(runs, builds);
@@ -66,7 +69,7 @@ std::vector<Timing> time_calls(const Rivals& rivals, const RaySet& set, std::spa
     for (const Tracer* tracer : rivals.all())
         for (TraceCall& call : tracer->calls(set.query, set.coherent))
             timings.push_back({tracer, std::move(call), std::vector<Answer>(set.rays.size()), {}});
-    std::vector<Measurement> passes;
+    std::vector<std::function<double()>> passes;
     for (Timing& timing : timings)
         passes.push_back([&] { return trace_rate(timing.call, set.rays, timing.answers, processors); });
     auto rates = interleave(runs, passes);
@@ -153,10 +156,11 @@ Result<Json> bench_scene(const Rivals& rivals, const SceneChoice& choice, const 
     if (scene->bvh.empty())
         return bad_input(fmt::format("{}: has no triangles to measure with.", choice.path.string()));
     show_progress(fmt::format("{}: make rays", choice.name));
-    const std::vector<RaySet> sets = make_ray_sets(*scene, opened->file.cameras.front().view, options.rays);
+    const std::vector<RaySet> sets =
+        make_ray_sets(*scene, opened->file.cameras.front().view, options.rays.value_or(k_default_rays));
 
     Json rows = Json::array();
-    for (const int threads : options.threads) {
+    for (const int threads : options.threads.empty() ? std::vector{1} : options.threads) {
         const Result<std::vector<int>> processors = choose_processors(threads);
         if (!processors) return processors.error();
         show_progress(fmt::format("{}: build, {} threads", choice.name, threads));

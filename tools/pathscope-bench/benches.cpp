@@ -8,6 +8,12 @@ const std::vector<Bench>& bench_table() {
          "rays per second of the trees, and of Embree",
          {"--scenes", "--scene", "--threads", "--rays"},
          bench_bvh},
+        {"image",
+         "samples per second, and error over time",
+         {"--scenes", "--scene", "--threads", "--size", "--spp", "--reference-spp"},
+         bench_image},
+        {"filter", "the joint bilateral filter", {"--threads", "--size"}, bench_filter},
+        {"ledger", "tiles per second through ledger and schedule", {}, bench_ledger},
     };
     return table;
 }

@@ -14,13 +14,13 @@ using namespace pathscope;
 using namespace pathscope::bench;
 
 void add_options(CLI::App& app, BenchOptions& options) {
-    std::string names = "which benchmark:";
+    std::string names = "which benchmark";
     for (const Bench& bench : bench_table())
-        names.append(" ").append(bench.name).append(" (").append(bench.does).append(")");
+        names.append("\n").append(bench.name).append(": ").append(bench.does);
+    const CLI::Range samples(1, int(k_max_samples_per_pixel));
     app.add_option("NAME", options.name, names)->required()->type_name("");
     app.add_option("--json", options.json, "write rows, machine and commit here")->type_name("FILE");
-    app.add_option("--runs", options.runs,
-                   "runs that the median is taken of, after one that does not count (5)")
+    app.add_option("--runs", options.runs, "rounds that count, after one that does not (5)")
         ->check(CLI::Range(k_min_runs, 1000))
         ->type_name("N");
     app.add_option("--scenes", options.scenes, "folder whose folders hold a scene.json each")
@@ -30,13 +30,21 @@ void add_options(CLI::App& app, BenchOptions& options) {
                    "of --scenes only this one, by name; or a further one, by path; may be repeated")
         ->allow_extra_args(false)
         ->type_name("NAME");
-    app.add_option("--threads", options.threads, "numbers of threads to measure with, as in 1,2 (1)")
+    app.add_option("--threads", options.threads, "numbers of threads to measure with (1; filter: 1,2)")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 1024))
         ->type_name("N,...");
     app.add_option("--rays", options.rays, "bvh: rays of each kind (1048576)")
         ->check(CLI::Range(256, 1 << 26))
+        ->type_name("N");
+    add_size(app, options.size, "pixels (image: 256x144; filter: 1280x720)");
+    app.add_option("--spp", options.spp, "image: most samples per pixel (16)")
+        ->check(samples)
+        ->type_name("N");
+    app.add_option("--reference-spp", options.reference_spp,
+                   "image: of the picture that is taken for true (256)")
+        ->check(samples)
         ->type_name("N");
 }
 

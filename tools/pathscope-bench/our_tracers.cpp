@@ -36,7 +36,7 @@ class TreeTracer final : public Tracer {
 
     double build(const Mesh& mesh, int threads) override {
         tree_ = {};
-        return wall_seconds([&] { tree_ = Policy::build(mesh, threads); });
+        return cost_of([&] { tree_ = Policy::build(mesh, threads); }).wall_s;
     }
 
     std::size_t bytes() const override { return Policy::bytes(tree_); }
