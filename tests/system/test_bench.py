@@ -18,7 +18,7 @@ RAY_KINDS = ["primary", "diffuse", "incoherent", "shadow", "shadow3"]
 BVH_KEYS = {
     "scene", "triangles", "rays", "ray_count", "threads", "ours", "our_call", "our_calls", "mrays_per_s", "hit_fraction",
     "embree_mrays_per_s", "ratio_vs_embree", "ratio_min", "ratio_max", "embree_call", "embree_calls", "disagreements", "build_s",
-    "embree_build_s", "bytes_per_triangle", "embree_bytes_per_triangle", "nodes_per_ray", "boxes_per_ray", "triangles_per_ray"}
+    "embree_build_s", "build_cpu_s", "embree_build_cpu_s", "bytes_per_triangle", "embree_bytes_per_triangle", "nodes_per_ray", "boxes_per_ray", "triangles_per_ray"}
 EMBREE_KEYS = {key for key in BVH_KEYS if "embree" in key} | {"ratio_min", "ratio_max", "disagreements"}
 MOST_DISAGREEMENTS = 1e-3  # of the rays: those that pass within rounding of an edge
 

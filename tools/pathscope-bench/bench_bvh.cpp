@@ -51,15 +51,15 @@ struct Timing {
     [[nodiscard]] double rate() const { return median(rates); }
 };
 
-/// Median wall-clock seconds of each tracer; afterwards each holds its tree.
-std::map<const Tracer*, double> build_all(const Rivals& rivals, const Mesh& mesh, int threads, int runs) {
+/// Median cost of building, of each tracer; afterwards each holds its tree.
+std::map<const Tracer*, Cost> build_all(const Rivals& rivals, const Mesh& mesh, int threads, int runs) {
     const std::vector<Tracer*> tracers = rivals.all();
-    std::vector<std::function<double()>> builds;
+    std::vector<std::function<Cost()>> builds;
     for (Tracer* tracer : tracers)
         builds.push_back([tracer, &mesh, threads] { return tracer->build(mesh, threads); });
-    const auto seconds = interleave(runs, builds);
-    std::map<const Tracer*, double> medians;
-    for (std::size_t i = 0; i < tracers.size(); ++i) medians[tracers[i]] = median(seconds[i]);
+    const auto costs = interleave(runs, builds);
+    std::map<const Tracer*, Cost> medians;
+    for (std::size_t i = 0; i < tracers.size(); ++i) medians[tracers[i]] = median(costs[i]);
     return medians;
 }
 
@@ -139,15 +139,66 @@ void add_counts(Json& row, const Tracer& tracer, const RaySet& set) {
 
 /// What a row says about the trees, whatever the rays.
 void add_trees(Json& row, const Tracer& ours, const Tracer* embree, double triangles,
-               const std::map<const Tracer*, double>& build_s) {
-    row["build_s"] = build_s.at(&ours);
-    row["embree_build_s"] = embree ? Json(build_s.at(embree)) : Json();
+               const std::map<const Tracer*, Cost>& builds) {
+    row["build_s"] = builds.at(&ours).wall_s;
+    row["embree_build_s"] = embree ? Json(builds.at(embree).wall_s) : Json();
+    row["build_cpu_s"] = builds.at(&ours).cpu_s;
+    row["embree_build_cpu_s"] = embree ? Json(builds.at(embree).cpu_s) : Json();
     row["bytes_per_triangle"] = double(ours.bytes()) / triangles;
     row["embree_bytes_per_triangle"] = embree ? Json(double(embree->bytes()) / triangles) : Json();
 }
 
+/// For each number of threads, the processors that they run on.
+using Placements = std::vector<std::vector<int>>;
+
+Result<Placements> choose_placements(const BenchOptions& options) {
+    Placements placements;
+    for (const int threads : options.threads.empty() ? std::vector{1} : options.threads) {
+        Result<std::vector<int>> processors = choose_processors(threads);
+        if (!processors) return processors.error();
+        placements.push_back(std::move(*processors));
+    }
+    return placements;
+}
+
+/// What the rows of one scene on one number of threads have in common.
+struct SceneRun {
+    const Rivals& rivals;
+    std::string name;
+    const Mesh& mesh;
+    const std::vector<int>& processors;
+    int runs;
+    std::map<const Tracer*, Cost> builds = build_all(rivals, mesh, int(processors.size()), runs);
+};
+
+/// One row for each of our trees.
+Json rows_of_set(const SceneRun& run, const RaySet& set) {
+    const Tracer* embree = run.rivals.embree.get();
+    const std::vector<Timing> timings = time_calls(run.rivals, set, run.processors, run.runs);
+    Json rows = Json::array();
+    for (const auto& tracer : run.rivals.ours) {
+        const Timing& ours = *fastest(timings, tracer.get());
+        Json row{{"scene", run.name},
+                 {"triangles", run.mesh.triangle_count()},
+                 {"rays", set.name},
+                 {"ray_count", set.rays.size()},
+                 {"threads", run.processors.size()},
+                 {"ours", tracer->name()},
+                 {"our_call", ours.call.name},
+                 {"our_calls", rates_of(timings, tracer.get())},
+                 {"mrays_per_s", ours.rate()},
+                 {"hit_fraction", hit_fraction(ours.answers)}};
+        add_comparison(row, set.query, ours, fastest(timings, embree), timings);
+        add_trees(row, *tracer, embree, run.mesh.triangle_count(), run.builds);
+        add_counts(row, *tracer, set);
+        rows.push_back(std::move(row));
+    }
+    return rows;
+}
+
 /// All rows of one scene.
-Result<Json> bench_scene(const Rivals& rivals, const SceneChoice& choice, const BenchOptions& options) {
+Result<Json> bench_scene(const Rivals& rivals, const SceneChoice& choice, const Placements& placements,
+                         const BenchOptions& options) {
     show_progress(fmt::format("{}: load", choice.name));
     Result<OpenedScene> opened = open_scene(choice.path, {});
     if (!opened) return opened.error();
@@ -158,34 +209,19 @@ Result<Json> bench_scene(const Rivals& rivals, const SceneChoice& choice, const 
     show_progress(fmt::format("{}: make rays", choice.name));
     const std::vector<RaySet> sets =
         make_ray_sets(*scene, opened->file.cameras.front().view, options.rays.value_or(k_default_rays));
+    for (const RaySet& set : sets)
+        if (set.rays.empty())
+            log_note(fmt::format("{}: no ray of the kind {} comes about; its row is left out.", choice.name,
+                                 set.name));
 
     Json rows = Json::array();
-    for (const int threads : options.threads.empty() ? std::vector{1} : options.threads) {
-        const Result<std::vector<int>> processors = choose_processors(threads);
-        if (!processors) return processors.error();
-        show_progress(fmt::format("{}: build, {} threads", choice.name, threads));
-        const std::map<const Tracer*, double> build_s = build_all(rivals, scene->mesh, threads, options.runs);
+    for (const std::vector<int>& processors : placements) {
+        show_progress(fmt::format("{}: build, {} threads", choice.name, processors.size()));
+        const SceneRun run{rivals, choice.name, scene->mesh, processors, options.runs};
         for (const RaySet& set : sets) {
-            if (set.rays.empty()) {
-                log_note(fmt::format("{}: no ray of the kind {} comes about; its row is left out.",
-                                     choice.name, set.name));
-                continue;
-            }
-            show_progress(fmt::format("{}: {} rays, {} threads", choice.name, set.name, threads));
-            const std::vector<Timing> timings = time_calls(rivals, set, *processors, options.runs);
-            for (const auto& tracer : rivals.ours) {
-                const Timing& ours = *fastest(timings, tracer.get());
-                Json row{{"scene", choice.name},       {"triangles", scene->mesh.triangle_count()},
-                         {"rays", set.name},           {"ray_count", set.rays.size()},
-                         {"threads", threads},         {"ours", tracer->name()},
-                         {"our_call", ours.call.name}, {"our_calls", rates_of(timings, tracer.get())},
-                         {"mrays_per_s", ours.rate()}};
-                row["hit_fraction"] = hit_fraction(ours.answers);
-                add_comparison(row, set.query, ours, fastest(timings, rivals.embree.get()), timings);
-                add_trees(row, *tracer, rivals.embree.get(), scene->mesh.triangle_count(), build_s);
-                add_counts(row, *tracer, set);
-                rows.push_back(std::move(row));
-            }
+            if (set.rays.empty()) continue;
+            show_progress(fmt::format("{}: {} rays, {} threads", choice.name, set.name, processors.size()));
+            for (Json& row : rows_of_set(run, set)) rows.push_back(std::move(row));
         }
     }
     return rows;
@@ -255,6 +291,8 @@ void print_tables(const Report& report) {
 Result<Report> bench_bvh(const BenchOptions& options) {
     const Result<std::vector<SceneChoice>> scenes = list_scenes(options);
     if (!scenes) return scenes.error();
+    const Result<Placements> placements = choose_placements(options);
+    if (!placements) return placements.error();
     const Rivals rivals;
     if (!rivals.embree)
         log_note("This program was built without Embree (libembree-dev); its columns stay empty.");
@@ -262,7 +300,7 @@ Result<Report> bench_bvh(const BenchOptions& options) {
     Report report;
     report.extra["peer"] = rivals.embree ? Json(rivals.embree->name()) : Json();
     for (const SceneChoice& scene : *scenes) {
-        Result<Json> rows = bench_scene(rivals, scene, options);
+        Result<Json> rows = bench_scene(rivals, scene, *placements, options);
         if (!rows) return rows.error();
         for (Json& row : *rows) report.rows.push_back(std::move(row));
     }

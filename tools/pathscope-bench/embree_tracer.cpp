@@ -19,8 +19,6 @@ std::unique_ptr<Tracer> make_embree_tracer() { return nullptr; }
 
 #include <atomic>
 
-#include "measure.hpp"
-
 namespace pathscope::bench {
 namespace {
 
@@ -200,7 +198,7 @@ class EmbreeTracer final : public Tracer {
 
     std::string name() const override { return "embree " RTC_VERSION_STRING; }
 
-    double build(const Mesh& mesh, int threads) override {
+    Cost build(const Mesh& mesh, int threads) override {
         release();
         device_ = rtcNewDevice(fmt::format("threads={},set_affinity=0", threads).c_str());
         CHECK(device_ != nullptr, int(rtcGetDeviceError(nullptr)));
@@ -208,9 +206,9 @@ class EmbreeTracer final : public Tracer {
         // Embree reads 16 bytes from each vertex, the last one too.
         positions_ = mesh.positions;
         positions_.emplace_back();
-        const double seconds = cost_of([&] { commit(mesh); }).wall_s;
+        const Cost cost = cost_of([&] { commit(mesh); });
         CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
-        return seconds;
+        return cost;
     }
 
     std::size_t bytes() const override { return std::size_t(bytes_.load()); }

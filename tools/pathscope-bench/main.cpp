@@ -7,6 +7,7 @@
 #include "bench.hpp"
 #include "measure.hpp"
 #include "pathscope/core/files.hpp"
+#include "terminal.hpp"
 
 namespace {
 
@@ -68,6 +69,7 @@ Result<void> run(const Bench& bench, const BenchOptions& options) {
     if (!options.json.empty())
         if (const auto ok = write_file_atomically(options.json, ""); !ok) return ok;
     const Result<Report> report = bench.run(options);
+    show_progress("");
     if (!report) return report.error();
     return options.json.empty() ? Result<void>()
                                 : write_file_atomically(options.json, report_json(options, *report));

@@ -1,4 +1,3 @@
-#include "measure.hpp"
 #include "pathscope/bvh/bvh.hpp"
 #include "pathscope/bvh/traverse.hpp"
 #include "tracer.hpp"
@@ -34,9 +33,9 @@ class TreeTracer final : public Tracer {
   public:
     std::string name() const override { return Policy::k_name; }
 
-    double build(const Mesh& mesh, int threads) override {
+    Cost build(const Mesh& mesh, int threads) override {
         tree_ = {};
-        return cost_of([&] { tree_ = Policy::build(mesh, threads); }).wall_s;
+        return cost_of([&] { tree_ = Policy::build(mesh, threads); });
     }
 
     std::size_t bytes() const override { return Policy::bytes(tree_); }

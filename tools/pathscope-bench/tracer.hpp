@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "measure.hpp"
 #include "pathscope/bvh/traversal_probe.hpp"
 #include "pathscope/geometry/mesh.hpp"
 #include "pathscope/math/ray.hpp"
@@ -49,8 +50,8 @@ class Tracer {
 
     [[nodiscard]] virtual std::string name() const = 0;
 
-    /// Replaces the tree; gives the wall-clock seconds it took, without throwing the old one away.
-    [[nodiscard]] virtual double build(const Mesh& mesh, int threads) = 0;
+    /// Replaces the tree; gives what it took, without throwing the old one away.
+    [[nodiscard]] virtual Cost build(const Mesh& mesh, int threads) = 0;
     /// Of the tree; the mesh that it was built from is not counted.
     [[nodiscard]] virtual std::size_t bytes() const = 0;
 
