@@ -14,7 +14,7 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parent.parent.parent
 DOCUMENT = (PROJECT / "docs" / "programs.md").read_text(encoding="utf-8")
 PROGRAMS = None  # from the command line
-REQUIRED = {"pathscope-render": ["scene.json", "-o", "image.png"]}
+REQUIRED = {"pathscope-render": ["scene.json", "-o", "image.png"], "pathscope-bench": ["bvh"]}
 
 
 def run(program, *arguments):

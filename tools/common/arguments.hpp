@@ -1,14 +1,18 @@
 #pragma once
-/// What the command lines of all programs share: levers by name, ports, and errors as one sentence.
+/// What the command lines of all programs share: levers by name, sizes, ports, and errors as one sentence.
+
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/core/result.hpp"
+#include "pathscope/image/block.hpp"
 #include "pathscope/session/build_identity.hpp"
 
 namespace pathscope {
@@ -23,6 +27,24 @@ CLI::Option* add_lever(CLI::App& app, const std::string& flag, E& value, const s
         .add_option_function<std::string>(flag, assign, help + " (" + std::string(name_of(value)) + ")")
         ->check(CLI::IsMember(names))
         ->type_name(joined_names<E>());
+}
+
+/// "640x360" -> {640, 360}
+inline CLI::Option* add_size(CLI::App& app, std::optional<std::pair<int, int>>& size,
+                             const std::string& help) {
+    const auto assign = [&size](const std::string& text) {
+        const std::vector<std::string> sides = CLI::detail::split(text, 'x');
+        std::pair<int, int> read;
+        const auto is_side = [](const std::string& side, int& value) {
+            return CLI::detail::lexical_cast(side, value) && value >= 1 && value <= k_max_image_side;
+        };
+        if (sides.size() != 2 || !is_side(sides[0], read.first) || !is_side(sides[1], read.second))
+            throw CLI::ValidationError(
+                "--size", fmt::format("'{}' is not a size from 1x1 to {}x{}, as in 640x360", text,
+                                      k_max_image_side, k_max_image_side));
+        size = read;
+    };
+    return app.add_option_function<std::string>("--size", assign, help)->type_name("WxH");
 }
 
 /// "5555,5556,5557" -> three ports from 1 to 65535.

@@ -9,21 +9,6 @@
 namespace pathscope {
 namespace {
 
-/// "640x360" -> {640, 360}
-std::pair<int, int> parse_size(const std::string& text) {
-    const std::size_t cross = text.find('x');
-    std::pair<int, int> size;
-    const bool good = cross != std::string::npos &&
-                      CLI::detail::lexical_cast(text.substr(0, cross), size.first) &&
-                      CLI::detail::lexical_cast(text.substr(cross + 1), size.second) && size.first >= 1 &&
-                      size.second >= 1 && size.first <= k_max_image_side && size.second <= k_max_image_side;
-    if (!good)
-        throw CLI::ValidationError("--size",
-                                   fmt::format("'{}' is not a size from 1x1 to {}x{}, as in 640x360", text,
-                                               k_max_image_side, k_max_image_side));
-    return size;
-}
-
 void add_image_options(CLI::App& app, RenderOptions& options) {
     app.add_option("SCENE", options.scene, "a scene file (.json), or a bare .obj")->required();
     app.add_option("-o,--output", options.outputs, "an .exr (layers), .png or .pfm; may be given again")
@@ -32,9 +17,7 @@ void add_image_options(CLI::App& app, RenderOptions& options) {
         ->type_name("FILE");
     app.add_option("--camera", options.camera, "one of the scene's cameras, by name (the first)")
         ->type_name("NAME");
-    app.add_option_function<std::string>(
-           "--size", [&](const std::string& text) { options.size = parse_size(text); }, "pixels")
-        ->type_name("WxH");
+    add_size(app, options.size, "pixels");
     const CLI::Range samples(1, int(k_max_samples_per_pixel));
     app.add_option("--spp", options.spp, "indirect samples per pixel (16)")->check(samples)->type_name("N");
     app.add_option("--direct-spp", options.direct_spp, "direct samples per pixel (as --spp)")

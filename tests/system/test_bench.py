@@ -1,0 +1,109 @@
+"""pathscope-bench as others use it: each benchmark in small, the keys of its JSON, figures that can be checked, and refusals.
+
+    test_bench.py BIN      BIN: the folder of pathscope-bench
+
+No figure is judged for speed: how fast a machine is depends on who else uses it.
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+PATIENCE_S = 600
+FILE_KEYS = {"bench", "machine", "commit", "build", "runs", "rows"}
+RAY_KINDS = ["primary", "diffuse", "incoherent", "shadow", "shadow3"]
+BVH_KEYS = {
+    "scene", "triangles", "rays", "ray_count", "threads", "ours", "our_call", "our_calls", "mrays_per_s", "hit_fraction",
+    "embree_mrays_per_s", "ratio_vs_embree", "ratio_min", "ratio_max", "embree_call", "embree_calls", "disagreements", "build_s",
+    "embree_build_s", "build_cpu_s", "embree_build_cpu_s", "bytes_per_triangle", "embree_bytes_per_triangle", "nodes_per_ray", "boxes_per_ray", "triangles_per_ray"}
+EMBREE_KEYS = {key for key in BVH_KEYS if "embree" in key} | {"ratio_min", "ratio_max", "disagreements"}
+MOST_DISAGREEMENTS = 1e-3  # of the rays: those that pass within rounding of an edge
+
+
+def run(*words):
+    return subprocess.run([BIN / "pathscope-bench", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE_S)
+
+
+class Bench(unittest.TestCase):
+    def measure(self, name, *words):
+        """The file that a benchmark writes."""
+        with tempfile.TemporaryDirectory(prefix="pathscope_bench_") as folder:
+            path = pathlib.Path(folder) / "bench.json"
+            done = run(name, "--json", path, *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            file = json.loads(path.read_text())
+        self.assertLessEqual(FILE_KEYS, set(file))
+        self.assertEqual(file["bench"], name)
+        self.assertGreaterEqual(file["runs"], 5)
+        self.assertTrue(file["machine"] and file["commit"])
+        return file
+
+    def test_bvh(self):
+        file = self.measure("bvh", "--scene", "scenes/cornell", "--rays", 4096)
+        rows = file["rows"]
+        for ours in {row["ours"] for row in rows}:
+            self.assertEqual([row["rays"] for row in rows if row["ours"] == ours], RAY_KINDS)
+        for row in rows:
+            with self.subTest(rays=row["rays"], ours=row["ours"]):
+                self.assertEqual(set(row), BVH_KEYS)
+                self.assertEqual((row["scene"], row["triangles"], row["threads"], row["ray_count"]), ("cornell", 38, 1, 4096))
+                self.assertGreater(row["mrays_per_s"], 0)
+                self.assertTrue(0 < row["hit_fraction"] <= 1)
+                self.check_embree(file, row)
+        two_wide = [row for row in rows if row["ours"] == "two-wide"]
+        for row in two_wide:  # A visit of an inner node tests two boxes, the root's own box is one more.
+            self.assertTrue(0 < row["nodes_per_ray"] <= row["boxes_per_ray"] <= 2 * row["nodes_per_ray"] + 1, row)
+
+    def check_embree(self, file, row):
+        """A build without Embree says so by nulls; one with it must agree with Embree on nearly every ray."""
+        if file["peer"] is None:
+            self.assertEqual({row[key] for key in EMBREE_KEYS}, {None})
+            return
+        self.assertLessEqual(row["disagreements"], MOST_DISAGREEMENTS * row["ray_count"])
+        self.assertLessEqual(row["ratio_min"], row["ratio_vs_embree"])
+        self.assertLessEqual(row["ratio_vs_embree"], row["ratio_max"])
+        self.assertEqual(row["embree_calls"][row["embree_call"]], row["embree_mrays_per_s"])
+
+    def test_scenes_of_a_folder_and_one_by_path(self):
+        rows = self.measure("bvh", "--scenes", "scenes", "--scene", "cornell", "--scene", "scenes/furnace/scene.json", "--rays", 256)["rows"]
+        self.assertEqual({row["scene"] for row in rows}, {"cornell", "furnace"})
+
+    def test_image(self):
+        rows = self.measure("image", "--scene", "scenes/cornell", "--size", "32x32", "--spp", 4, "--reference-spp", 64)["rows"]
+        self.assertEqual({row["setting"] for row in rows}, {"best", "textbook"})
+        for row in rows:
+            curve = row["rmse_at_s"]
+            self.assertEqual([point["spp"] for point in curve], [1, 2, 4])
+            self.assertGreater(curve[0]["rmse"], curve[-1]["rmse"])  # Half of it is expected: a wide margin.
+            self.assertGreater(row["rays_per_s"], row["samples_per_s"])
+
+    def test_filter(self):
+        rows = self.measure("filter", "--size", "64x64", "--threads", 1)["rows"]
+        self.assertEqual({(row["width"], row["height"], row["threads"]) for row in rows}, {(64, 64, 1)})
+        for variant in {row["variant"] for row in rows}:
+            self.assertEqual([row["radius"] for row in rows if row["variant"] == variant], [5, 7])
+        self.assertTrue(all(row["ms"] > 0 and row["cpu_ms"] > 0 for row in rows))
+
+    def test_ledger(self):
+        # The program itself checks that every tile was committed once.
+        rows = self.measure("ledger")["rows"]
+        self.assertEqual({row["schedule"] for row in rows}, {"static", "weighted", "pull"})
+        self.assertTrue(all(row["servers"] == 1000 and row["tiles_per_s"] > 0 for row in rows))
+
+    def test_refused(self):
+        for words, named in ((["race"], "bvh"), (["bvh"], "--scenes"), (["bvh", "--scene", "nowhere"], "nowhere"),
+                             (["ledger", "--rays", "1000"], "--rays"), (["filter", "--runs", "2"], "--runs"),
+                             (["ledger", "--json", "no/where.json"], "no/where.json"),
+                             (["bvh", "--scene", "scenes/cornell", "--threads", "1024"], "--threads")):
+            with self.subTest(words):
+                done = run(*words)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertEqual(len(done.stderr.strip().splitlines()), 1)
+                self.assertIn(named, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

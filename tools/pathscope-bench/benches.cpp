@@ -1,0 +1,33 @@
+#include "bench.hpp"
+
+namespace pathscope::bench {
+
+const std::vector<Bench>& bench_table() {
+    static const std::vector<Bench> table{
+        {"bvh",
+         "rays per second of the trees, and of Embree",
+         {"--scenes", "--scene", "--threads", "--rays"},
+         bench_bvh},
+        {"image",
+         "samples per second, and error over time",
+         {"--scenes", "--scene", "--threads", "--size", "--spp", "--reference-spp"},
+         bench_image},
+        {"filter", "the joint bilateral filter", {"--threads", "--size"}, bench_filter},
+        {"ledger", "tiles per second through ledger and schedule", {}, bench_ledger},
+    };
+    return table;
+}
+
+const Bench* find_bench(std::string_view name) {
+    for (const Bench& bench : bench_table())
+        if (bench.name == name) return &bench;
+    return nullptr;
+}
+
+std::string bench_names() {
+    std::string names;
+    for (const Bench& bench : bench_table()) names.append(names.empty() ? "" : ", ").append(bench.name);
+    return names;
+}
+
+}  // namespace pathscope::bench

@@ -1,0 +1,77 @@
+#include "pathscope/bvh/bvh.hpp"
+#include "pathscope/bvh/traverse.hpp"
+#include "tracer.hpp"
+
+namespace pathscope::bench {
+namespace {
+
+/// The two-wide tree that lessons show.
+struct TwoWide {
+    using Tree = Bvh;
+    static constexpr const char* k_name = "two-wide";
+    static Tree build(const Mesh& mesh, int threads) { return build_bvh(mesh, {}, threads); }
+    static std::size_t bytes(const Tree& tree) { return bvh_stats(tree).bytes; }
+};
+
+template <class Tree>
+void trace_closest(const Tree& tree, std::span<const Ray> rays, std::span<Answer> answers) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const auto hit = closest_hit(tree, rays[i]);
+        answers[i] = hit ? Answer{hit->t, hit->triangle} : Answer{};
+    }
+}
+
+template <class Tree>
+void trace_any(const Tree& tree, std::span<const Ray> rays, std::span<Answer> answers) {
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        answers[i].triangle = any_hit(tree, rays[i]) ? 0 : k_no_answer;
+}
+
+/// A tree that closest_hit() and any_hit() know. Policy: its type, its name, how to build it, its size.
+template <class Policy>
+class TreeTracer final : public Tracer {
+  public:
+    std::string name() const override { return Policy::k_name; }
+
+    Cost build(const Mesh& mesh, int threads) override {
+        tree_ = {};
+        return cost_of([&] { tree_ = Policy::build(mesh, threads); });
+    }
+
+    std::size_t bytes() const override { return Policy::bytes(tree_); }
+
+    std::vector<TraceCall> calls(RayQuery query, bool /*coherent*/) const override {
+        if (query == RayQuery::any)
+            return {{"any_hit", [this](auto rays, auto answers) { trace_any(tree_, rays, answers); }}};
+        return {{"closest_hit", [this](auto rays, auto answers) { trace_closest(tree_, rays, answers); }}};
+    }
+
+    std::optional<TraversalCounts> count(RayQuery query, std::span<const Ray> rays) const override {
+        TraversalCounts counts;
+        if constexpr (requires(const typename Policy::Tree& tree, const Ray& ray, AcceptAll accept) {
+                          closest_hit(tree, ray, accept, counts);
+                          any_hit(tree, ray, accept, counts);
+                      }) {
+            for (const Ray& ray : rays)
+                if (query == RayQuery::any)
+                    (void)any_hit(tree_, ray, AcceptAll{}, counts);
+                else
+                    (void)closest_hit(tree_, ray, AcceptAll{}, counts);
+            return counts;
+        }
+        return std::nullopt;
+    }
+
+  private:
+    typename Policy::Tree tree_;
+};
+
+}  // namespace
+
+std::vector<std::unique_ptr<Tracer>> make_our_tracers() {
+    std::vector<std::unique_ptr<Tracer>> tracers;
+    tracers.push_back(std::make_unique<TreeTracer<TwoWide>>());
+    return tracers;
+}
+
+}  // namespace pathscope::bench
