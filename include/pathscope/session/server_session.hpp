@@ -40,6 +40,7 @@ struct ServerConfig {
     int threads = 0;                ///< 0 = all cores.
     double samples_per_second = 0;  ///< Speed cap; 0 = none.
     std::filesystem::path cache_folder;
+    std::optional<MeshCache> mesh_cache;
 };
 
 class ServerSession {
