@@ -12,7 +12,7 @@
 /// a new file is written, those that were not used for the longest time go, until the rest is within the limit.
 /// The payload has the byte order of its machine, which is part of the key.
 ///
-/// Thread safety: yes.   Test: tests/scene/test_mesh_cache.cpp
+/// Thread safety: yes.   Tests: tests/scene/test_mesh_cache.cpp, tests/system/test_mesh_cache.py
 
 #include <cstddef>
 #include <cstdint>
