@@ -30,6 +30,8 @@ Result<std::string> read_file(const std::filesystem::path& path) {
     if (!file) return bad_input(fmt::format("Cannot open {}: {}.", path.string(), reason()));
 
     std::string bytes;
+    if (const std::uintmax_t size = std::filesystem::file_size(path, ignored); !ignored)
+        bytes.reserve(std::size_t(size));
     char buffer[1 << 16];
     while (const std::size_t got = std::fread(buffer, 1, sizeof buffer, file.get()))
         bytes.append(buffer, got);

@@ -132,6 +132,12 @@ std::string DiskFiles::display_name(std::string_view name) const {
     return is_absolute(name) ? std::string(name) : (root_ / name).lexically_normal().string();
 }
 
+std::optional<Digest> DiskFiles::known_hash(std::string_view name) const {
+    const auto found = found_.find(name);
+    if (found == found_.end()) return std::nullopt;
+    return found->second.hash;
+}
+
 Manifest DiskFiles::manifest() const {
     Manifest manifest;
     for (const auto& [name, found] : found_) manifest.files.push_back({name, found.size, found.hash});
@@ -164,6 +170,12 @@ Result<std::optional<std::string>> ManifestFiles::find(std::string_view name) {
         return failed(
             fmt::format("{}: the cached copy differs from what the client listed; fetch it again.", name));
     return std::optional(std::move(*bytes));
+}
+
+std::optional<Digest> ManifestFiles::known_hash(std::string_view name) const {
+    const auto entry = files_.find(name);
+    if (entry == files_.end()) return std::nullopt;
+    return entry->second.hash;
 }
 
 }  // namespace pathscope

@@ -110,8 +110,9 @@ void append(Mesh& mesh, Mesh&& more) {
 
 class Loader {
   public:
-    Loader(const SceneFile& scene, FileSource& files, const SceneOptions& options)
-        : scene_(scene), files_(files), options_(options), library_(files) {}
+    Loader(const SceneFile& scene, FileSource& files, const SceneOptions& options,
+           const std::optional<MeshCache>& cache)
+        : scene_(scene), files_(files), options_(options), cache_(cache), library_(files) {}
 
     Result<SceneParts> run() {
         for (const std::string& obj : scene_.objs)
@@ -132,9 +133,7 @@ class Loader {
 
   private:
     Result<void> add_obj(const std::string& obj) {
-        Result<std::string> text = files_.read(obj);
-        if (!text) return text.error();
-        Result<ObjModel> model = parse_obj(std::move(*text), files_.display_name(obj), options_.smoothing);
+        Result<ObjModel> model = read_model(obj);
         if (!model) return model.error();
         if (model->degenerate_triangles > 0)
             log_warning(fmt::format("{}: {} triangle{} without area left out.", files_.display_name(obj),
@@ -152,6 +151,23 @@ class Loader {
         for (std::uint32_t& material : model->mesh.materials) material = (*numbers)[material];
         append(parts_.mesh, std::move(model->mesh));
         return {};
+    }
+
+    /// The OBJ is read in any case: its bytes say which cached mesh is its own, and servers are sent them.
+    Result<ObjModel> read_model(const std::string& obj) {
+        Result<std::string> text = files_.read(obj);
+        if (!text) return text.error();
+        const auto parse = [&] {
+            return parse_obj(std::move(*text), files_.display_name(obj), options_.smoothing);
+        };
+        if (!cache_ || text->size() < cache_->limits().least_obj_bytes) return parse();
+
+        const std::optional<Digest> known = files_.known_hash(obj);
+        const Digest key = MeshCache::key_of(known ? *known : hash_text(*text), options_.smoothing);
+        if (std::optional<ObjModel> cached = cache_->find(key)) return std::move(*cached);
+        Result<ObjModel> model = parse();
+        if (model) cache_->store(key, *model);
+        return model;
     }
 
     /// The scene's number of each material of an OBJ. Files that share an MTL share its materials.
@@ -262,6 +278,7 @@ class Loader {
     const SceneFile& scene_;
     FileSource& files_;
     const SceneOptions& options_;
+    const std::optional<MeshCache>& cache_;
     MaterialLibrary library_;
     TextureRequests requests_;
     std::vector<MaterialSource> sources_;
@@ -271,8 +288,9 @@ class Loader {
 
 }  // namespace
 
-Result<SceneParts> load_scene_parts(const SceneFile& scene, FileSource& files, const SceneOptions& options) {
-    return Loader(scene, files, options).run();
+Result<SceneParts> load_scene_parts(const SceneFile& scene, FileSource& files, const SceneOptions& options,
+                                    const std::optional<MeshCache>& cache) {
+    return Loader(scene, files, options, cache).run();
 }
 
 }  // namespace pathscope

@@ -86,7 +86,8 @@ void choose_lights(SceneFile& scene, const SceneParts& parts) {
 
 }  // namespace
 
-Result<OpenedScene> open_scene(const std::filesystem::path& path, const SceneOptions& options) {
+Result<OpenedScene> open_scene(const std::filesystem::path& path, const SceneOptions& options,
+                               const std::optional<MeshCache>& cache) {
     OpenedScene opened;
     const std::string extension = lower_extension(path);
     if (extension == ".json") {
@@ -100,7 +101,7 @@ Result<OpenedScene> open_scene(const std::filesystem::path& path, const SceneOpt
     }
 
     opened.files = std::make_unique<DiskFiles>(path.parent_path());
-    Result<SceneParts> parts = load_scene_parts(opened.file, *opened.files, options);
+    Result<SceneParts> parts = load_scene_parts(opened.file, *opened.files, options, cache);
     if (!parts) return parts.error();
     opened.parts = std::move(*parts);
     choose_camera(opened.file, opened.parts.mesh);

@@ -126,12 +126,16 @@ Result<void> ClientSession::open_sockets() {
 Result<void> ClientSession::start_local_servers() {
     for (int i = 0; i < config_.local_servers; ++i) {
         const std::string name = fmt::format("server-{}", i + 1);
-        auto process = ChildProcess::start(
-            config_.server_program,
-            {"--connect", config_.host, "--ports",
-             fmt::format("{},{},{}", config_.ports[0], config_.ports[1], config_.ports[2]), "--threads",
-             std::to_string(config_.local_server_threads), "--name", name, "--bvh",
-             std::string(name_of(config_.tree)), "--quiet"});
+        std::vector<std::string> arguments{
+            "--connect", config_.host,
+            "--ports",   fmt::format("{},{},{}", config_.ports[0], config_.ports[1], config_.ports[2]),
+            "--threads", std::to_string(config_.local_server_threads),
+            "--name",    name,
+            "--bvh",     std::string(name_of(config_.tree)),
+            "--quiet"};
+        if (!config_.local_server_mesh_cache.empty())
+            arguments.insert(arguments.end(), {"--mesh-cache", config_.local_server_mesh_cache});
+        auto process = ChildProcess::start(config_.server_program, arguments);
         if (!process) return process.error();
         local_servers_.push_back({std::move(*process), name});
     }

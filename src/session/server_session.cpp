@@ -307,7 +307,7 @@ void ServerSession::begin_loading() {
     loading_ = true;
     loader_.post([this, state = held_->state, manifest = fetch_->manifest()] {
         ManifestFiles files(manifest, [this](const Digest& hash) { return cache_.path_of(hash); });
-        Result<SceneParts> parts = load_scene_parts(state.scene, files, state.options);
+        Result<SceneParts> parts = load_scene_parts(state.scene, files, state.options, config_.mesh_cache);
         if (!parts) return loaded_.put({state, parts.error()});
         Result<Scene> scene = make_scene(state.scene, std::move(*parts), {config_.threads, config_.tree});
         if (!scene) return loaded_.put({state, scene.error()});

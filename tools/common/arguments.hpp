@@ -13,6 +13,7 @@
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/block.hpp"
+#include "pathscope/scene/mesh_cache.hpp"
 #include "pathscope/session/build_identity.hpp"
 
 namespace pathscope {
@@ -61,6 +62,24 @@ inline CLI::Option* add_ports(CLI::App& app, std::array<int, 3>& ports) {
     return app
         .add_option_function<std::string>("--ports", assign, "input, monitor and frames (5555,5556,5557)")
         ->type_name("A,B,C");
+}
+
+/// --mesh-cache DIR|off, as a word that mesh_cache_of() understands; empty if it is not given.
+inline CLI::Option* add_mesh_cache(CLI::App& app, std::string& word) {
+    return app
+        .add_option("--mesh-cache", word,
+                    "folder for parsed OBJ files, by content; safe to delete (in the user's cache folder)")
+        ->check(CLI::Validator(
+            [](const std::string& name) { return name.empty() ? std::string("a folder has a name") : ""; },
+            "DIR"))
+        ->type_name("DIR|off");
+}
+
+/// In the folder that was named, or in `meshes` in the user's or the server's cache folder.
+inline std::optional<MeshCache> mesh_cache_of(const std::string& word,
+                                              const std::filesystem::path& cache_folder) {
+    if (word == "off") return std::nullopt;
+    return MeshCache(word.empty() ? cache_folder / "meshes" : std::filesystem::path(word));
 }
 
 /// Parses; gives the text to print for --help and --version, nothing when the program shall go on.

@@ -1,9 +1,16 @@
-#include "pathscope/bvh/bvh.hpp"
-#include "pathscope/bvh/traverse.hpp"
+#include "pathscope/bvh/tree.hpp"
 #include "tracer.hpp"
 
 namespace pathscope::bench {
 namespace {
+
+/// The wide tree that renders.
+struct Wide {
+    using Tree = WideBvh;
+    static constexpr const char* k_name = "wide";
+    static Tree build(const Mesh& mesh, int threads) { return build_wide_bvh(mesh, {}, threads); }
+    static std::size_t bytes(const Tree& tree) { return wide_bvh_stats(tree).bytes; }
+};
 
 /// The two-wide tree that lessons show.
 struct TwoWide {
@@ -70,6 +77,7 @@ class TreeTracer final : public Tracer {
 
 std::vector<std::unique_ptr<Tracer>> make_our_tracers() {
     std::vector<std::unique_ptr<Tracer>> tracers;
+    tracers.push_back(std::make_unique<TreeTracer<Wide>>());
     tracers.push_back(std::make_unique<TreeTracer<TwoWide>>());
     return tracers;
 }

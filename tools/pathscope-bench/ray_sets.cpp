@@ -69,7 +69,7 @@ class PathMaker {
     }
 
     [[nodiscard]] std::optional<Vertex> follow(const Ray& ray) const {
-        const std::optional<Hit> hit = closest_hit(scene_.bvh, ray);
+        const std::optional<Hit> hit = closest_hit(scene_.tree, ray);
         if (!hit) return std::nullopt;
         const SurfacePoint point = surface_point(scene_.mesh, *hit);
         const bool front = dot(point.geometric_normal, ray.direction) < 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "../common/arguments.hpp"
+#include "pathscope/session/scene_cache.hpp"
 
 namespace pathscope {
 namespace {
@@ -100,6 +101,7 @@ void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) 
     app.add_option("--threads", client.threads, "of the client's own rendering; 0 = all cores (0)")
         ->check(CLI::Range(0, 1024))
         ->type_name("N");
+    add_mesh_cache(app, client.local_server_mesh_cache);
     app.add_option("--stats", options.stats, "write figures of the run as JSON")->type_name("FILE");
     app.add_option("--trace", options.trace, "write a time line for ui.perfetto.dev")->type_name("FILE");
 }
@@ -135,6 +137,7 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     if (!text) return text.error();
     if (*text) return std::variant<RenderOptions, std::string>(**text);
 
+    options.mesh_cache = mesh_cache_of(options.client.local_server_mesh_cache, SceneCache::default_folder());
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (options.client.listens) {
         if (!is_loopback(options.client.host) && !insecure)

@@ -25,6 +25,7 @@ struct RenderOptions {
     std::optional<int> bounces;
     RenderSettings settings;  ///< Levers, seed and filter.
     SceneOptions scene_options;
+    std::optional<MeshCache> mesh_cache;
     ClientConfig client;
     bool direct_only = false, indirect_only = false;
     std::vector<std::string> buffers;

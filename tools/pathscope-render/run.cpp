@@ -129,7 +129,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     const TimeNs begin = monotonic_now();
     if (const auto ok = check_outputs(options); !ok) return ok;
 
-    Result<OpenedScene> opened = open_scene(options.scene, options.scene_options);
+    Result<OpenedScene> opened = open_scene(options.scene, options.scene_options, options.mesh_cache);
     if (!opened) return opened.error();
     const TimeNs loaded = monotonic_now();
     Result<Scene> scene =

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
     using namespace pathscope;
     ServerConfig config;
     config.cache_folder = SceneCache::default_folder();
+    std::string mesh_cache;
     bool quiet = false;
     CLI::App app("Renders indirect light for a client; goes on trying until told to stop (Ctrl+C).",
                  "pathscope-server");
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
         ->type_name("NAME");
     app.add_option("--cache", config.cache_folder, "folder for scene files, by content; safe to delete")
         ->type_name("DIR");
+    add_mesh_cache(app, mesh_cache);
     app.add_flag("--quiet", quiet, "say only what is wrong");
     const auto text = parse_arguments(app, argc, argv);
     if (!text) return report("pathscope-server", text.error());
@@ -49,6 +51,7 @@ int main(int argc, char** argv) {
         std::fputs((*text)->c_str(), stdout);
         return 0;
     }
+    config.mesh_cache = mesh_cache_of(mesh_cache, config.cache_folder);
     if (quiet)
         set_log_sink([](LogLevel level, std::string_view sentence) {
             if (level == LogLevel::warning)

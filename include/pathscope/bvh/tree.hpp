@@ -46,7 +46,7 @@ using Tree = std::variant<Bvh, WideBvh>;
 
 template <class Accept = AcceptAll>
 [[nodiscard]] std::optional<Hit> closest_hit(const Tree& tree, const Ray& ray, const Accept& accept = {}) {
-    if (const auto* wide = std::get_if<WideBvh>(&tree)) return closest_hit(*wide, ray, hit_filter(accept));
+    if (const auto* wide = std::get_if<WideBvh>(&tree)) return closest_hit(*wide, ray, accept);
     return closest_hit(*std::get_if<Bvh>(&tree), ray, accept);
 }
 
@@ -54,14 +54,13 @@ template <class Accept = AcceptAll>
 template <class Accept>
 [[nodiscard]] std::optional<Hit> closest_hit(const Tree& tree, const Ray& ray, const Accept& accept,
                                              TraversalCounts& counts) {
-    if (const auto* wide = std::get_if<WideBvh>(&tree))
-        return wide_kernel(simd_level()).count_closest_hit(*wide, ray, hit_filter(accept), counts);
+    if (const auto* wide = std::get_if<WideBvh>(&tree)) return closest_hit(*wide, ray, accept, counts);
     return closest_hit(*std::get_if<Bvh>(&tree), ray, accept, counts);
 }
 
 template <class Accept = AcceptAll>
 [[nodiscard]] bool any_hit(const Tree& tree, const Ray& ray, const Accept& accept = {}) {
-    if (const auto* wide = std::get_if<WideBvh>(&tree)) return any_hit(*wide, ray, hit_filter(accept));
+    if (const auto* wide = std::get_if<WideBvh>(&tree)) return any_hit(*wide, ray, accept);
     return any_hit(*std::get_if<Bvh>(&tree), ray, accept);
 }
 

@@ -57,13 +57,28 @@ namespace detail {
 extern const WideKernel& k_wide_kernel;  ///< That of simd_level().
 }
 
-[[nodiscard]] inline std::optional<Hit> closest_hit(const WideBvh& bvh, const Ray& ray,
-                                                    HitFilter filter = {}) {
-    return detail::k_wide_kernel.closest_hit(bvh, ray, filter);
+template <class Accept = AcceptAll>
+[[nodiscard]] std::optional<Hit> closest_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept = {}) {
+    return detail::k_wide_kernel.closest_hit(bvh, ray, hit_filter(accept));
 }
 
-[[nodiscard]] inline bool any_hit(const WideBvh& bvh, const Ray& ray, HitFilter filter = {}) {
-    return detail::k_wide_kernel.any_hit(bvh, ray, filter);
+template <class Accept = AcceptAll>
+[[nodiscard]] bool any_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept = {}) {
+    return detail::k_wide_kernel.any_hit(bvh, ray, hit_filter(accept));
+}
+
+// The same, counted: a block of triangles is a node, and all of its places are triangles that were tested.
+
+template <class Accept>
+[[nodiscard]] std::optional<Hit> closest_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept,
+                                             TraversalCounts& counts) {
+    return detail::k_wide_kernel.count_closest_hit(bvh, ray, hit_filter(accept), counts);
+}
+
+template <class Accept>
+[[nodiscard]] bool any_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept,
+                           TraversalCounts& counts) {
+    return detail::k_wide_kernel.count_any_hit(bvh, ray, hit_filter(accept), counts);
 }
 
 }  // namespace pathscope

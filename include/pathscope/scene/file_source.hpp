@@ -42,6 +42,9 @@ class FileSource {
     /// How errors name a file: as a path that a person can open, where there is one.
     [[nodiscard]] virtual std::string display_name(std::string_view name) const { return std::string(name); }
 
+    /// Of the bytes that find() gave for this name, where the source has it at hand: hashing takes time.
+    [[nodiscard]] virtual std::optional<Digest> known_hash(std::string_view) const { return std::nullopt; }
+
     /// As find(), but a missing file is an error.
     [[nodiscard]] Result<std::string> read(std::string_view name);
 };
@@ -77,6 +80,7 @@ class DiskFiles final : public FileSource {
 
     [[nodiscard]] Result<std::optional<std::string>> find(std::string_view name) override;
     [[nodiscard]] std::string display_name(std::string_view name) const override;
+    [[nodiscard]] std::optional<Digest> known_hash(std::string_view name) const override;
 
     [[nodiscard]] Manifest manifest() const;
 
@@ -106,6 +110,7 @@ class ManifestFiles final : public FileSource {
     ManifestFiles(const Manifest& manifest, PathOfHash path_of_hash);
 
     [[nodiscard]] Result<std::optional<std::string>> find(std::string_view name) override;
+    [[nodiscard]] std::optional<Digest> known_hash(std::string_view name) const override;
 
   private:
     std::map<std::string, ManifestEntry, std::less<>> files_;

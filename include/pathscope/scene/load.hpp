@@ -5,7 +5,8 @@
 /// is an error with file and line; what is odd but can be lived with is said once (core/log.hpp): a missing
 /// texture, triangles without area, properties that are not used.
 ///
-/// The result is a pure function of the files' bytes, the scene file and the options.
+/// The result is a pure function of the files' bytes, the scene file and the options. A mesh cache
+/// (mesh_cache.hpp) changes how long it takes and nothing else.
 /// Thread safety: yes, for different FileSources.   Test: tests/scene/test_load.cpp
 
 #include <cstddef>
@@ -19,6 +20,7 @@
 #include "pathscope/image/image.hpp"
 #include "pathscope/scene/file_source.hpp"
 #include "pathscope/scene/material.hpp"
+#include "pathscope/scene/mesh_cache.hpp"
 #include "pathscope/scene/scene_file.hpp"
 #include "pathscope/scene/texture.hpp"
 
@@ -46,7 +48,8 @@ struct SceneParts {
 inline constexpr std::size_t k_max_texture_bytes = std::size_t{4} << 30;
 
 [[nodiscard]] Result<SceneParts> load_scene_parts(const SceneFile& scene, FileSource& files,
-                                                  const SceneOptions& options);
+                                                  const SceneOptions& options,
+                                                  const std::optional<MeshCache>& cache = std::nullopt);
 
 struct OpenedScene {
     SceneFile file;  ///< Complete: with at least one camera and one light.
@@ -57,6 +60,7 @@ struct OpenedScene {
 /// Opens a scene file (.json) or a bare .obj. What the file does not say is chosen so that something is seen,
 /// and said in a note: a camera that sees the whole mesh; a sky where nothing emits. A bare .obj that is
 /// named by a scene.json beside it (as its obj or one of its variants) takes camera and lights from there.
-[[nodiscard]] Result<OpenedScene> open_scene(const std::filesystem::path& path, const SceneOptions& options);
+[[nodiscard]] Result<OpenedScene> open_scene(const std::filesystem::path& path, const SceneOptions& options,
+                                             const std::optional<MeshCache>& cache = std::nullopt);
 
 }  // namespace pathscope

@@ -27,6 +27,7 @@ struct ClientConfig {
     int local_servers = 0;  ///< Servers to start as child processes.
     int local_server_threads = 1;
     std::filesystem::path server_program;
+    std::string local_server_mesh_cache;  ///< Their --mesh-cache; empty = what they choose themselves.
 
     int min_servers = 0;  ///< Indirect light waits until so many are ready.
     ScheduleKind schedule = ScheduleKind::pull;

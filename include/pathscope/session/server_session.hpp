@@ -41,6 +41,7 @@ struct ServerConfig {
     TreeKind tree = TreeKind::wide;
     double samples_per_second = 0;  ///< Speed cap; 0 = none.
     std::filesystem::path cache_folder;
+    std::optional<MeshCache> mesh_cache;
 };
 
 class ServerSession {
