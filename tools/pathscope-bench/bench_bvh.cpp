@@ -204,7 +204,7 @@ Result<Json> bench_scene(const Rivals& rivals, const SceneChoice& choice, const 
     if (!opened) return opened.error();
     const Result<Scene> scene = make_scene(opened->file, std::move(opened->parts));
     if (!scene) return scene.error();
-    if (scene->bvh.empty())
+    if (bounds(scene->mesh).empty())
         return bad_input(fmt::format("{}: has no triangles to measure with.", choice.path.string()));
     show_progress(fmt::format("{}: make rays", choice.name));
     const std::vector<RaySet> sets =
