@@ -14,8 +14,10 @@ namespace {
 /// Sets above this are divided one level at a time, all sets of a level at once; those below grow to their leaves, all at
 /// once. A constant, so that the tree does not depend on the number of threads.
 constexpr std::size_t k_subtree_references = 4096;
-/// Where the boxes of an object split overlap by less, relative to the root, cutting triangles gains nothing.
-constexpr float k_worthwhile_overlap = 1e-5f;
+/// Cutting triangles gains little where the boxes of an object split overlap by less than this part of their parent, or of the
+/// root, or where the triangles would fit into a few blocks anyway.
+constexpr float k_overlap_of_parent = 0.2f, k_overlap_of_root = 1e-5f;
+constexpr std::size_t k_uncut_references = 2 * k_wide;
 
 struct Rules {
     const Mesh& mesh;
@@ -39,10 +41,10 @@ std::size_t divide(const Rules& rules, std::vector<Reference>& references, std::
         return begin + partition_at_median(all, bounds);
 
     const auto object = find_object_split(all, bounds, rules.params.bins);
-    // What fits into one block is not cut: it would fit no longer.
-    const bool overlaps = !object || intersection(object->left, object->right).half_area() >
-                                         k_worthwhile_overlap * rules.root_area;
-    if (overlaps && budget > 0 && all.size() > k_wide && rules.params.spatial_gain < 1) {
+    const float worthwhile =
+        std::max(k_overlap_of_parent * bounds.boxes.half_area(), k_overlap_of_root * rules.root_area);
+    const bool overlaps = !object || intersection(object->left, object->right).half_area() > worthwhile;
+    if (overlaps && budget > 0 && all.size() > k_uncut_references && rules.params.spatial_gain < 1) {
         const auto spatial = find_spatial_split(rules.mesh, all, bounds.boxes.box());
         const bool gains =
             spatial && (!object || spatial->cost < (1 - rules.params.spatial_gain) * object->cost);
