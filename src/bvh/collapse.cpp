@@ -8,6 +8,7 @@
 ///
 /// Children come after their parents in the array, so one pass from its end finds all of it.
 
+#include <algorithm>
 #include <limits>
 
 #include "bvh/binary_tree.hpp"
@@ -113,6 +114,11 @@ class Collapser {
             collect(children, node.left, to_left);
             collect(children, node.left + 1, k_wide - to_left);
         }
+        // The largest last: whoever looks for any hit begins there.
+        std::stable_sort(children.roots.begin(), children.roots.begin() + std::ptrdiff_t(children.count),
+                         [this](std::uint32_t a, std::uint32_t b) {
+                             return tree_.nodes[a].box.half_area() < tree_.nodes[b].box.half_area();
+                         });
         return children;
     }
 

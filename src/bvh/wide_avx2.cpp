@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 
 #include "bvh/wide_kernels.hpp"
 #include "pathscope/bvh/box_ray.hpp"
@@ -15,7 +16,7 @@
 
 #pragma GCC target("avx2,fma,bmi")
 #define PATHSCOPE_SIMD avx2
-#include "bvh/wide_kernel.hpp"
+#include "bvh/packet_kernel.hpp"
 
 namespace pathscope {
 const WideKernel& wide_kernel_avx2() { return avx2::k_kernel; }

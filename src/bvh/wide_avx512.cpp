@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 
 #include "bvh/wide_kernels.hpp"
 #include "pathscope/bvh/box_ray.hpp"
@@ -16,7 +17,7 @@
 
 #pragma GCC target("avx2,fma,bmi,avx512f,avx512vl")
 #define PATHSCOPE_SIMD avx512
-#include "bvh/wide_kernel.hpp"
+#include "bvh/packet_kernel.hpp"
 
 namespace pathscope {
 const WideKernel& wide_kernel_avx512() { return avx512::k_kernel; }

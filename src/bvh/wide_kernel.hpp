@@ -157,8 +157,10 @@ class WideStack {
     std::array<Entry, k_wide_max_depth*(k_wide - 1) + k_wide> entries_;
 };
 
-/// Which of the children that are met comes next; the others wait. Most nodes have one or two: those need no sorting, and no
-/// branch that depends on which of them is the nearer. All of them are on their way from memory at once.
+/// Which of the children that are met comes next; the others wait. All of them are on their way from memory at once.
+///
+/// ordered: the nearest. Most nodes have one or two: those need no sorting, and no branch that depends on which is nearer.
+/// Else: the last, which is the largest (collapse.cpp), since that is where any hit is likely.
 template <bool ordered>
 [[nodiscard]] inline std::uint32_t choose_child(const WideBvh& bvh, const WideNode& node, Lanes met,
                                                 Float8 t_near, WideStack& stack) {
@@ -171,8 +173,12 @@ template <bool ordered>
         child& k_leaf_child ? prefetch(bvh.blocks[child & ~k_leaf_child]) : prefetch(bvh.nodes[child]);
         return WideStack::entry(distances[i], child);
     };
-    const WideStack::Entry one = take();
+    WideStack::Entry one = take();
     if (!any(met)) return WideStack::child_of(one);
+    if constexpr (!ordered) {
+        for (; any(met); one = take()) stack.push(one);
+        return WideStack::child_of(one);
+    }
     const WideStack::Entry two = take();
     const WideStack::Entry nearer = std::min(one, two), farther = std::max(one, two);
     stack.push(farther);
@@ -180,7 +186,7 @@ template <bool ordered>
     stack.push(nearer);
     std::size_t count = 2;
     for (; any(met); ++count) stack.push(take());
-    if constexpr (ordered) stack.sort_top(count);
+    stack.sort_top(count);
     std::uint32_t child = 0;
     (void)stack.pop(k_infinity, child);
     return child;
@@ -188,8 +194,8 @@ template <bool ordered>
 
 /// Calls open_block(block) for the blocks that the ray meets before t_max, nearer ones first (as far as boxes tell), until it
 /// returns true. `ordered` = false leaves the order open.
-template <bool ordered, class OpenBlock, class Probe>
-inline void walk(const WideBvh& bvh, const WideBoxRay& ray, const float& t_max, OpenBlock&& open_block,
+template <bool ordered, class BoxRays, class OpenBlock, class Probe>
+inline void walk(const WideBvh& bvh, const BoxRays& ray, const float& t_max, OpenBlock&& open_block,
                  Probe& probe) {
     WideStack stack;
     std::uint32_t current = 0;
@@ -248,24 +254,6 @@ template <class Probe>
     walk<false>(bvh, box_ray, t_max, open_block, probe);
     return found;
 }
-
-/// What wide_kernel() hands out.
-inline constexpr WideKernel k_kernel{
-    [](const WideBvh& bvh, const Ray& ray, HitFilter filter) {
-        NullTraversalProbe probe;
-        return find_closest(bvh, ray, filter, probe);
-    },
-    [](const WideBvh& bvh, const Ray& ray, HitFilter filter) {
-        NullTraversalProbe probe;
-        return find_any(bvh, ray, filter, probe);
-    },
-    [](const WideBvh& bvh, const Ray& ray, HitFilter filter, TraversalCounts& counts) {
-        return find_closest(bvh, ray, filter, counts);
-    },
-    [](const WideBvh& bvh, const Ray& ray, HitFilter filter, TraversalCounts& counts) {
-        return find_any(bvh, ray, filter, counts);
-    },
-};
 
 }  // namespace PATHSCOPE_SIMD
 }  // namespace pathscope

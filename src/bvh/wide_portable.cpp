@@ -1,4 +1,4 @@
-#include "bvh/wide_kernel.hpp"
+#include "bvh/packet_kernel.hpp"
 #include "bvh/wide_kernels.hpp"
 
 namespace pathscope {

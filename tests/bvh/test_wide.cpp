@@ -124,6 +124,47 @@ TEST_CASE("the filter is honoured: holes are seen through") {
     }
 }
 
+TEST_CASE("rays in packets find what they find alone, bit for bit, coherent or not") {
+    HashRng rng(21);
+    for (int number = 0; number < 4; ++number) {
+        const Mesh mesh = wide_test_mesh(number);
+        const WideBvh bvh = build_wide_bvh(mesh);
+        RayMaker odd_rays(mesh, 40 + static_cast<std::uint32_t>(number));
+        const auto every_other = [](std::uint32_t triangle, float, float) { return triangle % 2 == 0; };
+        int differ = 0, hits = 0;
+        for (int i = 0; i < (k_sanitized ? 300 : 3000); ++i) {
+            // A bundle of rays with a common origin or nearby ones, a bundle around an axis, or anything at all.
+            const Vec3 from = random_point(rng, {{-1, -1, -1}, {2, 2, 2}});
+            const Vec3 axis = i % 3 == 1 ? Vec3{0, 1, 0} : normalize(random_point(rng, bounds(mesh)) - from);
+            std::vector<Ray> rays;
+            const std::size_t count = i % 5 == 0 ? 1 + rng.next_u32() % k_packet_rays : k_packet_rays;
+            while (rays.size() < count) {
+                const Vec3 origin = i % 2 == 0 ? from : from + random_direction(rng) * 0.01f;
+                Ray ray{origin, normalize(axis + random_direction(rng) * 0.02f)};
+                if (i % 7 == 0) ray = odd_rays.next();
+                if (i % 4 == 0) ray.t_max = 2 * rng.next_float();
+                if (!is_zero_direction(ray)) rays.push_back(ray);
+            }
+            for (const SimdLevel level : levels())
+                for (const HitFilter filter : {HitFilter{}, hit_filter(every_other)}) {
+                    std::array<std::optional<Hit>, k_packet_rays> closest;
+                    wide_kernel(level).closest_hit_packet(bvh, rays, filter, std::span(closest).first(count));
+                    const std::uint32_t any = wide_kernel(level).any_hit_packet(bvh, rays, filter);
+                    for (std::size_t k = 0; k < count; ++k) {
+                        const auto expected =
+                            wide_kernel(SimdLevel::portable).closest_hit(bvh, rays[k], filter);
+                        hits += expected.has_value();
+                        differ += closest[k] != expected;
+                        differ += (any >> k & 1) != expected.has_value();
+                    }
+                }
+        }
+        CAPTURE(number);
+        CHECK(differ == 0);
+        CHECK(hits > 1000);
+    }
+}
+
 TEST_CASE("of coincident triangles the lowest number counts") {
     Mesh mesh;
     for (int i = 0; i < 40; ++i) add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});

@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <array>
+#include <type_traits>
+
 #include "pathscope/bvh/tree.hpp"
 #include "tracer.hpp"
 
@@ -34,6 +38,25 @@ void trace_any(const Tree& tree, std::span<const Ray> rays, std::span<Answer> an
         answers[i].triangle = any_hit(tree, rays[i]) ? 0 : k_no_answer;
 }
 
+void trace_closest_packets(const WideBvh& tree, std::span<const Ray> rays, std::span<Answer> answers) {
+    std::array<std::optional<Hit>, k_packet_rays> hits;
+    for (std::size_t first = 0; first < rays.size(); first += k_packet_rays) {
+        const std::size_t count = std::min(k_packet_rays, rays.size() - first);
+        closest_hits(tree, rays.subspan(first, count), std::span(hits).first(count));
+        for (std::size_t i = 0; i < count; ++i)
+            answers[first + i] = hits[i] ? Answer{hits[i]->t, hits[i]->triangle} : Answer{};
+    }
+}
+
+void trace_any_packets(const WideBvh& tree, std::span<const Ray> rays, std::span<Answer> answers) {
+    for (std::size_t first = 0; first < rays.size(); first += k_packet_rays) {
+        const std::size_t count = std::min(k_packet_rays, rays.size() - first);
+        const std::uint32_t met = any_hits(tree, rays.subspan(first, count));
+        for (std::size_t i = 0; i < count; ++i)
+            answers[first + i].triangle = (met >> i & 1) != 0 ? 0 : k_no_answer;
+    }
+}
+
 /// A tree that closest_hit() and any_hit() know. Policy: its type, its name, how to build it, its size.
 template <class Policy>
 class TreeTracer final : public Tracer {
@@ -47,10 +70,26 @@ class TreeTracer final : public Tracer {
 
     std::size_t bytes() const override { return Policy::bytes(tree_); }
 
-    std::vector<TraceCall> calls(RayQuery query, bool /*coherent*/) const override {
-        if (query == RayQuery::any)
-            return {{"any_hit", [this](auto rays, auto answers) { trace_any(tree_, rays, answers); }}};
-        return {{"closest_hit", [this](auto rays, auto answers) { trace_closest(tree_, rays, answers); }}};
+    std::vector<TraceCall> calls(RayQuery query, bool coherent) const override {
+        const bool any = query == RayQuery::any;
+        std::vector<TraceCall> calls;
+        if (any)
+            calls.push_back(
+                {"any_hit", [this](auto rays, auto answers) { trace_any(tree_, rays, answers); }});
+        else
+            calls.push_back(
+                {"closest_hit", [this](auto rays, auto answers) { trace_closest(tree_, rays, answers); }});
+        if constexpr (std::is_same_v<typename Policy::Tree, WideBvh>) {
+            if (coherent && any)
+                calls.push_back({"any_hits", [this](auto rays, auto answers) {
+                                     trace_any_packets(tree_, rays, answers);
+                                 }});
+            if (coherent && !any)
+                calls.push_back({"closest_hits", [this](auto rays, auto answers) {
+                                     trace_closest_packets(tree_, rays, answers);
+                                 }});
+        }
+        return calls;
     }
 
     std::optional<TraversalCounts> count(RayQuery query, std::span<const Ray> rays) const override {

@@ -91,6 +91,8 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 struct Double8 {
     __m512d lanes;
 };
+/// Requires: aligned to 64 bytes.
+[[nodiscard]] inline Double8 load(const double* eight) { return {_mm512_load_pd(eight)}; }
 [[nodiscard]] inline Double8 widen(Float8 a) { return {_mm512_cvtps_pd(a.lanes)}; }
 [[nodiscard]] inline Float8 narrow(Double8 a) { return {_mm512_cvtpd_ps(a.lanes)}; }
 [[nodiscard]] inline Double8 broadcast(double a) { return {_mm512_set1_pd(a)}; }
@@ -120,6 +122,9 @@ struct Double8 {
 struct Double8 {
     __m256d low, high;
 };
+[[nodiscard]] inline Double8 load(const double* eight) {
+    return {_mm256_load_pd(eight), _mm256_load_pd(eight + 4)};
+}
 [[nodiscard]] inline Double8 widen(Float8 a) {
     return {_mm256_cvtps_pd(_mm256_castps256_ps128(a.lanes)),
             _mm256_cvtps_pd(_mm256_extractf128_ps(a.lanes, 1))};
@@ -235,6 +240,11 @@ template <class Test>
 }
 }  // namespace lanewise
 
+[[nodiscard]] inline Double8 load(const double* eight) {
+    Double8 result;
+    for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = eight[i];
+    return result;
+}
 [[nodiscard]] inline Double8 widen(Float8 a) {
     Double8 result;
     for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = a.lanes[i];
