@@ -6,7 +6,7 @@
 ///
 ///     t_near = min((near plane - o) i_low, (near plane - o) i_high)        o: the origin that makes it least
 ///
-/// and none leaves it after the corresponding t_far. Rounding is monotonic, so this holds for the numbers that BoxRay would
+/// and none leaves it after the corresponding t_far. The same goes for the boxes of single triangles. Rounding is monotonic, so this holds for the numbers that BoxRay would
 /// compute for each ray, and no ray misses a leaf that it would open on its own. In the leaves it is the other way round:
 /// one triangle is tested with eight rays at a time, each in the arithmetic of a single ray. Hence the same hits, bit for bit.
 
@@ -80,20 +80,38 @@ struct PacketBounds {
     return {slab(0), slab(1), slab(2), broadcast(bounds.t_min)};
 }
 
-[[nodiscard]] inline Lanes intersect_children(const WideNode& node, const PacketBoxRay& ray, float t_max,
-                                              Float8& t_near) {
-    const float* const planes = node.bounds[0].data();
+/// plane(which) gives the planes of eight boxes, numbered as in WideNode::bounds, in floats.
+template <class Plane>
+[[nodiscard]] inline Lanes intersect_boxes(const PacketBoxRay& ray, float t_max, Float8& t_near,
+                                           Plane plane) {
     const auto near = [&](const PacketBoxRay::Slab& slab) {
-        const Float8 distance = load(planes + slab.near) - slab.near_origin;
+        const Float8 distance = plane(slab.near) - slab.near_origin;
         return min(distance * slab.inverse_low, distance * slab.inverse_high);
     };
     const auto far = [&](const PacketBoxRay::Slab& slab) {
-        const Float8 distance = load(planes + slab.far) - slab.far_origin;
+        const Float8 distance = plane(slab.far) - slab.far_origin;
         return max(distance * slab.inverse_low, distance * slab.inverse_high);
     };
     t_near = max(max(near(ray.x), near(ray.y)), max(near(ray.z), ray.t_min));
     const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max)));
     return at_most(t_near, t_far * broadcast(k_far_stretch));
+}
+
+[[nodiscard]] inline Lanes intersect_children(const WideNode& node, const PacketBoxRay& ray, float t_max,
+                                              Float8& t_near) {
+    const float* const planes = node.bounds[0].data();
+    return intersect_boxes(ray, t_max, t_near, [&](std::size_t which) { return load(planes + which); });
+}
+
+/// The triangles of a block whose own boxes some ray of the packet may meet: few, since a packet is small.
+[[nodiscard]] inline Lanes may_meet(const TriangleBlock& block, const PacketBoxRay& ray, float t_max) {
+    Float8 t_near;
+    return intersect_boxes(ray, t_max, t_near, [&](std::size_t which) {
+        const std::size_t axis = which / k_wide % 3;
+        const Float8 a = load(block.corners[0][axis].data()), b = load(block.corners[1][axis].data()),
+                     c = load(block.corners[2][axis].data());
+        return which < 3 * k_wide ? min(a, min(b, c)) : max(a, max(b, c));
+    });
 }
 
 /// Fills the rows; false if the rays' longest axes differ.
@@ -161,17 +179,20 @@ struct PacketBounds {
     return hit;
 }
 
-/// Calls found(ray, triangle, hit) for each triangle of the block and each ray of the packet that meets it.
+/// Calls found(ray, triangle, hit) for each of these triangles of the block and each ray of the packet that meets it.
 template <class Found>
-inline void intersect_block(const TriangleBlock& block, const PacketRays& rays, Found&& found) {
+inline void intersect_block(const TriangleBlock& block, Lanes triangles, const PacketRays& rays,
+                            Found&& found) {
     BlockHits hits;
-    for (std::size_t lane = 0; lane < k_wide && !std::isnan(block.corners[0][0][lane]); ++lane)
-        for (std::size_t first_ray = 0; first_ray < k_packet_rays; first_ray += k_wide)
-            for (Lanes lanes = intersect_rays(block, lane, rays, first_ray, hits); any(lanes);
-                 lanes = without_first(lanes)) {
-                const auto i = static_cast<std::size_t>(first(lanes));
+    for (; any(triangles); triangles = without_first(triangles))
+        for (std::size_t first_ray = 0; first_ray < k_packet_rays; first_ray += k_wide) {
+            const auto lane = static_cast<std::size_t>(first(triangles));
+            for (Lanes met = intersect_rays(block, lane, rays, first_ray, hits); any(met);
+                 met = without_first(met)) {
+                const auto i = static_cast<std::size_t>(first(met));
                 found(first_ray + i, block.triangles[lane], TriangleHit{hits.t[i], hits.u[i], hits.v[i]});
             }
+        }
 }
 
 /// False if the rays are too different to go together: then nothing was done.
@@ -181,8 +202,12 @@ template <bool ordered, class OpenBlock>
     const PacketBounds bounds(rays);
     if (!bounds.coherent() || !fill_packet(packet, rays)) return false;
     t_max = packet.farthest();
+    const PacketBoxRay box_ray = packet_box_ray(bounds, bvh.bounds);
     NullTraversalProbe probe;
-    walk<ordered>(bvh, packet_box_ray(bounds, bvh.bounds), t_max, open_block, probe);
+    const auto open = [&](const TriangleBlock& block) {
+        return open_block(block, may_meet(block, box_ray, t_max));
+    };
+    walk<ordered>(bvh, box_ray, t_max, open, probe);
     return true;
 }
 
@@ -199,8 +224,8 @@ inline void find_closest_packet(const WideBvh& bvh, std::span<const Ray> rays, H
         best = Hit{hit.t, hit.u, hit.v, triangle};
         packet.t_max[ray] = hit.t;
     };
-    const auto open_block = [&](const TriangleBlock& block) {
-        intersect_block(block, packet, keep_closest);
+    const auto open_block = [&](const TriangleBlock& block, Lanes triangles) {
+        intersect_block(block, triangles, packet, keep_closest);
         t_max = packet.farthest();
         return false;
     };
@@ -221,8 +246,8 @@ inline void find_closest_packet(const WideBvh& bvh, std::span<const Ray> rays, H
         packet.t_max[ray] = -1;  // It needs no more.
         packet.t_min[ray] = 1;
     };
-    const auto open_block = [&](const TriangleBlock& block) {
-        intersect_block(block, packet, accept);
+    const auto open_block = [&](const TriangleBlock& block, Lanes triangles) {
+        intersect_block(block, triangles, packet, accept);
         t_max = packet.farthest();
         return met == (1u << rays.size()) - 1;
     };
