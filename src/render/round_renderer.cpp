@@ -1,7 +1,8 @@
 #include "pathscope/render/round_renderer.hpp"
 
 #include <algorithm>
-#include <mutex>
+#include <array>
+#include <span>
 
 #include "pathscope/core/parallel_for.hpp"
 
@@ -17,23 +18,61 @@ struct RowResult {
 
 bool is_radiance(Rgb value) { return is_finite(value) && min_component(value) >= 0; }
 
+/// Some samples of a row, pixel by pixel, whose camera rays are traced together: they are close to each other.
+class CameraPacket {
+  public:
+    struct Sample {
+        int x;
+        std::uint32_t number;
+        PixelSampler sampler;
+    };
+
+    [[nodiscard]] bool full() const { return samples_.size() == k_packet_rays; }
+    void add(int x, std::uint32_t number, const PixelSampler& sampler, const Ray& ray) {
+        samples_.push_back({x, number, sampler});
+        rays_.push_back(ray);
+    }
+
+    /// Calls finish(sample, its ray and hit) for each; then the packet is empty.
+    template <class Finish>
+    void trace(const Scene& scene, Finish finish) {
+        std::array<std::optional<SceneHit>, k_packet_rays> hits;
+        intersect(scene, rays_, std::span(hits).first(rays_.size()));
+        for (std::size_t i = 0; i < samples_.size(); ++i) finish(samples_[i], TracedRay{rays_[i], hits[i]});
+        samples_.clear();
+        rays_.clear();
+    }
+
+  private:
+    std::vector<Sample> samples_;
+    std::vector<Ray> rays_;
+};
+
 template <LightPart part>
 RowResult render_row(const Scene& scene, const CameraFrame& camera, const RenderSettings& settings,
                      const Round& round, int y, PixelSum* sums) {
     RowResult row;
-    for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x, ++sums)
+    const auto finish = [&](const CameraPacket::Sample& sample, const TracedRay& first) {
+        ++row.rays;
+        const Rgb radiance =
+            estimate_radiance<part>(scene, settings.transport, first, sample.sampler, row.rays);
+        if (!is_radiance(radiance)) {
+            row.dropped.push_back({std::uint32_t(sample.x), std::uint32_t(y), sample.number});
+            return;
+        }
+        bool saturated = false;
+        sums[sample.x - round.rect.x] += quantise(radiance, settings.quantum, saturated);
+        row.saturated += saturated;
+    };
+
+    CameraPacket packet;
+    for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t sample = round.first; sample < round.first + round.count; ++sample) {
             const PixelSampler sampler(settings.transport.sampler, settings.seed, x, y, sample);
-            const Ray ray = camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension));
-            const Rgb radiance = estimate_radiance<part>(scene, settings.transport, ray, sampler, row.rays);
-            if (!is_radiance(radiance)) {
-                row.dropped.push_back({std::uint32_t(x), std::uint32_t(y), sample});
-                continue;
-            }
-            bool saturated = false;
-            *sums += quantise(radiance, settings.quantum, saturated);
-            row.saturated += saturated;
+            packet.add(x, sample, sampler, camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension)));
+            if (packet.full()) packet.trace(scene, finish);
         }
+    packet.trace(scene, finish);
     return row;
 }
 

@@ -1,5 +1,7 @@
 #include "pathscope/scene/scene.hpp"
 
+#include <array>
+
 #include "lookup.hpp"
 
 namespace pathscope {
@@ -73,6 +75,14 @@ std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
     return complete_hit(
         scene, ray,
         scene.has_cutouts ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray));
+}
+
+void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::optional<SceneHit>> hits) {
+    std::array<std::optional<Hit>, k_packet_rays> found;
+    const std::span<std::optional<Hit>> closest = std::span(found).first(rays.size());
+    scene.has_cutouts ? closest_hits(scene.tree, rays, closest, Solid{scene})
+                      : closest_hits(scene.tree, rays, closest);
+    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = complete_hit(scene, rays[i], closest[i]);
 }
 
 std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts) {

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <variant>
 
 #include "pathscope/bvh/bvh.hpp"
@@ -56,6 +57,15 @@ template <class Accept>
                                              TraversalCounts& counts) {
     if (const auto* wide = std::get_if<WideBvh>(&tree)) return closest_hit(*wide, ray, accept, counts);
     return closest_hit(*std::get_if<Bvh>(&tree), ray, accept, counts);
+}
+
+/// closest[i] = closest_hit(tree, rays[i], accept): wide_traverse.hpp.
+template <class Accept = AcceptAll>
+void closest_hits(const Tree& tree, std::span<const Ray> rays, std::span<std::optional<Hit>> closest,
+                  const Accept& accept = {}) {
+    if (const auto* wide = std::get_if<WideBvh>(&tree)) return closest_hits(*wide, rays, closest, accept);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        closest[i] = closest_hit(*std::get_if<Bvh>(&tree), rays[i], accept);
 }
 
 template <class Accept = AcceptAll>

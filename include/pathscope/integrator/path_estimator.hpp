@@ -46,9 +46,22 @@ struct NullPathProbe {
 /// otherwise make noise where the textbook has none. Beyond it, two facing mirrors must end as well.
 inline constexpr int k_free_specular_bounces = 16;
 
+/// A ray and what it hits. Camera rays may be traced many at once (render/round_renderer.hpp), before their paths begin.
+struct TracedRay {
+    Ray ray;
+    std::optional<SceneHit> hit;
+};
+
+[[nodiscard]] inline TracedRay trace(const Scene& scene, const Ray& ray) {
+    return {ray, intersect(scene, ray)};
+}
+
+/// rays: counts those that are traced here; `first` was counted by whoever traced it.
 template <LightPart part, class Probe = NullPathProbe>
-[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings, Ray ray,
-                                    const PixelSampler& sampler, std::uint64_t& rays, Probe&& probe = {}) {
+[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings,
+                                    const TracedRay& first, const PixelSampler& sampler, std::uint64_t& rays,
+                                    Probe&& probe = {}) {
+    auto [ray, hit] = first;
     Rgb radiance;
     Rgb throughput{1, 1, 1};
     PathOrigin origin;  // What the ray leaves: the camera at first, later a vertex.
@@ -64,8 +77,6 @@ template <LightPart part, class Probe = NullPathProbe>
         // Light that the ray runs into. It is direct as long as the ray comes from the camera, from a specular start,
         // or from the first non-specular vertex; and then MIS shares it with the light sample taken there.
         const bool sees_direct = diffuse_vertices == 0 || (diffuse_vertices == 1 && origin.diffuse);
-        ++rays;
-        const std::optional<SceneHit> hit = intersect(scene, ray);
         if (sees_direct == (part == LightPart::direct))
             add(bounce, throughput * emission_towards(scene, settings, origin, ray, hit));
         if (part == LightPart::direct && diffuse_vertices > 0) break;
@@ -98,8 +109,18 @@ template <LightPart part, class Probe = NullPathProbe>
         }
         origin = next->origin;
         ray = spawn_ray(vertex.point, next->direction);
+        hit = intersect(scene, ray);
+        ++rays;
     }
     return radiance;
+}
+
+/// The same for a ray that is not traced yet.
+template <LightPart part, class Probe = NullPathProbe>
+[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings, const Ray& ray,
+                                    const PixelSampler& sampler, std::uint64_t& rays, Probe&& probe = {}) {
+    ++rays;
+    return estimate_radiance<part>(scene, settings, trace(scene, ray), sampler, rays, probe);
 }
 
 }  // namespace pathscope

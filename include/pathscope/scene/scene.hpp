@@ -16,6 +16,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pathscope/bvh/tree.hpp"
@@ -77,6 +78,10 @@ struct SceneHit {
 
 /// Whether anything lies in [t_min, t_max] of the ray.
 [[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);
+
+/// hits[i] = intersect(scene, rays[i]), bit by bit, and faster for rays of neighbouring pixels. Requires: at most
+/// k_packet_rays of them, as many places in hits.
+void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::optional<SceneHit>> hits);
 
 /// intersect(), counted: for the traversal-cost buffer.
 [[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts);
