@@ -25,6 +25,14 @@ struct PixelMean {
     Rgb colour;    ///< Undefined where weight is 0.
 };
 
+/// What the filtered picture shows of a mean. Weight is 0 only where a pixel is not a number, as all others count
+/// themselves: such a one is copied through.
+[[nodiscard]] inline Rgb filtered_colour(const PixelMean& mean, const Image& noisy, const Guides& guides,
+                                         const GuideUse& use, int x, int y) {
+    if (mean.weight == 0) return noisy.at(x, y);
+    return use.demodulate_albedo ? mean.colour * demodulator(guides.albedo.at(x, y)) : mean.colour;
+}
+
 /// Calls use(x, y, mean) for each pixel of `frame`, from several threads.
 template <class Use>
 void for_each_mean(const Features& features, int colour_set, const FilterPass& pass, PixelRect frame,

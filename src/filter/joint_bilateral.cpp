@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "filter/features.hpp"
 #include "filter/filter_pass.hpp"
+#include "filter/input_checks.hpp"
 
 namespace pathscope {
 namespace {
@@ -26,30 +26,16 @@ std::vector<Tap> square_of_taps(const Features& features, const BilateralParams&
     return taps;
 }
 
-void check_inputs(const Image& noisy, const Guides& guides, const BilateralParams& params) {
-    const auto params_are_good = check_params(params);
-    CHECK(params_are_good, params_are_good ? "" : params_are_good.error().message);
-    const auto fits = [&](const auto& guide) { return guide.empty() || guide.rect() == noisy.rect(); };
-    CHECK(fits(guides.normal) && fits(guides.albedo) && fits(guides.depth), noisy.rect(),
-          guides.normal.rect(), guides.albedo.rect(), guides.depth.rect());
-    CHECK(!params.demodulate_albedo || noisy.empty() || !guides.albedo.empty(), noisy.rect());
-}
-
 }  // namespace
 
 Result<void> check_params(const BilateralParams& params) {
     if (params.radius < 0 || params.radius > k_max_filter_radius)
         return bad_input(fmt::format("A filter radius of {} is not possible: it is 0 to {} pixels.",
                                      params.radius, k_max_filter_radius));
-    const std::pair<const char*, float> sigmas[] = {{"spatial", params.sigma_spatial},
-                                                    {"normal", params.sigma_normal},
-                                                    {"depth", params.sigma_depth},
-                                                    {"albedo", params.sigma_albedo}};
-    for (const auto& [name, sigma] : sigmas)
-        if (!(sigma >= k_min_filter_sigma))
-            return bad_input(fmt::format("A filter sigma_{} of {} is not possible: it is at least {}.", name,
-                                         sigma, k_min_filter_sigma));
-    return {};
+    return check_sigmas({{"spatial", params.sigma_spatial},
+                         {"normal", params.sigma_normal},
+                         {"depth", params.sigma_depth},
+                         {"albedo", params.sigma_albedo}});
 }
 
 Image joint_bilateral(const Image& noisy, const Guides& guides, const BilateralParams& params, int threads) {
@@ -61,12 +47,7 @@ Image joint_bilateral(const Image& noisy, const Guides& guides, const BilateralP
     const FilterPass pass{tap_kernel(simd_level()).by_guides, square_of_taps(features, params)};
     Image filtered(noisy.width, noisy.height);
     for_each_mean(features, 0, pass, noisy.rect(), threads, [&](int x, int y, const PixelMean& mean) {
-        // A pixel always counts itself with weight 1, unless it is not a number.
-        Rgb& out = filtered.at(x, y);
-        if (mean.weight == 0)
-            out = noisy.at(x, y);
-        else
-            out = use.demodulate_albedo ? mean.colour * demodulator(guides.albedo.at(x, y)) : mean.colour;
+        filtered.at(x, y) = filtered_colour(mean, noisy, guides, use, x, y);
     });
     return filtered;
 }
