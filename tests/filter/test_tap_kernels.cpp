@@ -118,8 +118,8 @@ TEST_CASE("the bits are the same at every level and for any beginning and length
     tap_kernel_portable().by_guides_and_colour(strip.planes(), strip.taps, 1.5f, k_strip, whole);
     for (const SimdLevel level : levels_of_this_machine()) {
         CAPTURE(std::string(name_of(level)));
-        for (const std::size_t begin : {0, 1, 13, 63}) {
-            for (const std::size_t count : {1, 7, 17, 51, 64}) {
+        for (const std::size_t begin : {0, 1, 13, 31}) {
+            for (const std::size_t count : {1, 7, 17, 19, 32}) {
                 if (begin + count > k_strip) continue;
                 StripPlanes planes = strip.planes();
                 planes.guides += begin;
