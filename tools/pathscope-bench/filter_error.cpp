@@ -76,7 +76,7 @@ Json measure_scene(const std::string& name, const Task& task, const BenchOptions
     const auto spp = std::uint32_t(options.spp.value_or(4));
     show_progress(fmt::format("filter: {}: reference", name));
     const Image truth =
-        render_indirect(task, std::uint32_t(options.reference_spp.value_or(2048)), k_reference_seed);
+        render_indirect(task, std::uint32_t(options.reference_spp.value_or(1024)), k_reference_seed);
 
     const std::vector<Filter> all = filters();
     Errors before;
