@@ -81,11 +81,22 @@ class Bench(unittest.TestCase):
             self.assertGreater(row["rays_per_s"], row["samples_per_s"])
 
     def test_filter(self):
-        rows = self.measure("filter", "--size", "64x64", "--threads", 1)["rows"]
+        file = self.measure("filter", "--size", "64x64", "--threads", 1)
+        rows = file["rows"]
         self.assertEqual({(row["width"], row["height"], row["threads"]) for row in rows}, {(64, 64, 1)})
-        for variant in {row["variant"] for row in rows}:
-            self.assertEqual([row["radius"] for row in rows if row["variant"] == variant], [5, 7])
+        self.assertEqual([(row["variant"], row["radius"]) for row in rows],
+                         [("joint_bilateral", 5), ("joint_bilateral", 7), ("atrous", 14), ("atrous", 62)])
         self.assertTrue(all(row["ms"] > 0 and row["cpu_ms"] > 0 for row in rows))
+        self.assertEqual(file["errors"], [])
+
+    def test_filter_errors(self):
+        errors = self.measure("filter", "--size", "64x64", "--threads", 1, "--scene", "scenes/cornell", "--spp", 1,
+                              "--reference-spp", 64)["errors"]
+        self.assertEqual(len(errors), 5)
+        for row in errors:
+            # Four times at the least is expected, less the noise of the reference: a wide margin.
+            self.assertLess(2 * row["rmse_after"], row["rmse_before"], row)
+            self.assertLess(4 * row["rel_mse_after"], row["rel_mse_before"], row)
 
     def test_ledger(self):
         # The program itself checks that every tile was committed once.

@@ -1,24 +1,24 @@
-/// filter: how long does the joint bilateral filter take on a picture of the window's size?
+/// filter: how long do the filters take on a picture of the window's size, and how much error do they take away?
 ///
 /// The picture is noise over tiles that face six ways, in two colours, on a floor that recedes: as in a rendering, most
 /// neighbours of a pixel lie on its own surface, and some beyond an edge. The time hardly depends on it, as
-/// the filter looks at each neighbour either way.
+/// the filter looks at each neighbour either way. The error is measured on the scenes that are named (filter_error.hpp).
 
 #include <fmt/format.h>
 
 #include <array>
 
 #include "bench.hpp"
+#include "filter_error.hpp"
 #include "measure.hpp"
 #include "pathscope/core/parallel_for.hpp"
+#include "pathscope/filter/atrous.hpp"
 #include "pathscope/filter/joint_bilateral.hpp"
 #include "pathscope/math/random.hpp"
 #include "terminal.hpp"
 
 namespace pathscope::bench {
 namespace {
-
-constexpr std::array k_radii{5, 7};
 
 struct Picture {
     Image noisy;
@@ -46,20 +46,31 @@ Picture make_picture(int width, int height) {
 /// One way of filtering. A new one is a line here.
 struct Variant {
     const char* name;
-    Image (*filter)(const Picture& picture, int radius, int threads);
-};
-constexpr std::array k_variants{
-    Variant{"joint_bilateral",
-            [](const Picture& picture, int radius, int threads) {
-                BilateralParams params;
-                params.radius = radius;
-                params.sigma_spatial = float(radius) / 2;
-                return joint_bilateral(picture.noisy, picture.guides, params, threads);
-            }},
+    int radius;  ///< How far from a pixel its value may come.
+    Image (*filter)(const Picture& picture, int threads);
 };
 
+template <int radius>
+Image run_bilateral(const Picture& picture, int threads) {
+    BilateralParams params;
+    params.radius = radius;
+    params.sigma_spatial = float(radius) / 2;
+    return joint_bilateral(picture.noisy, picture.guides, params, threads);
+}
+
+template <int levels>
+Image run_atrous(const Picture& picture, int threads) {
+    AtrousParams params;
+    params.levels = levels;
+    return atrous(picture.noisy, picture.guides, params, threads);
+}
+
+constexpr std::array k_variants{
+    Variant{"joint_bilateral", 5, run_bilateral<5>}, Variant{"joint_bilateral", 7, run_bilateral<7>},
+    Variant{"atrous", atrous_reach(3), run_atrous<3>}, Variant{"atrous", atrous_reach(5), run_atrous<5>}};
+
 struct Case {
-    int radius, threads;
+    int threads;
     const Variant* variant;
 };
 
@@ -75,13 +86,11 @@ Result<Report> bench_filter(const BenchOptions& options) {
     show_progress("filter");
     const Picture picture = make_picture(width, height);
     std::vector<Case> cases;
-    for (const int radius : k_radii)
-        for (const int count : threads)
-            for (const Variant& variant : k_variants) cases.push_back({radius, count, &variant});
+    for (const Variant& variant : k_variants)
+        for (const int count : threads) cases.push_back({count, &variant});
     std::vector<std::function<Cost()>> passes;
     for (const Case& c : cases)
-        passes.push_back(
-            [&] { return cost_of([&] { (void)c.variant->filter(picture, c.radius, c.threads); }); });
+        passes.push_back([&] { return cost_of([&] { (void)c.variant->filter(picture, c.threads); }); });
     const auto costs = interleave(options.runs, passes);
     show_progress("");
 
@@ -93,15 +102,19 @@ Result<Report> bench_filter(const BenchOptions& options) {
         const double ms = 1e3 * cost.wall_s, cpu_ms = 1e3 * cost.cpu_s;
         report.rows.push_back({{"width", width},
                                {"height", height},
-                               {"radius", c.radius},
+                               {"radius", c.variant->radius},
                                {"threads", c.threads},
                                {"variant", c.variant->name},
                                {"ms", ms},
                                {"cpu_ms", cpu_ms}});
-        table.add({c.variant->name, fmt::format("{}x{}", width, height), std::to_string(c.radius),
+        table.add({c.variant->name, fmt::format("{}x{}", width, height), std::to_string(c.variant->radius),
                    std::to_string(c.threads), fmt::format("{:.1f}", ms), fmt::format("{:.1f}", cpu_ms)});
     }
     table.print();
+
+    Result<nlohmann::ordered_json> errors = measure_filter_errors(options);
+    if (!errors) return errors.error();
+    report.extra["errors"] = std::move(*errors);
     return report;
 }
 

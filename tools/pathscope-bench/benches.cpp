@@ -12,7 +12,10 @@ const std::vector<Bench>& bench_table() {
          "samples per second, and error over time",
          {"--scenes", "--scene", "--threads", "--size", "--spp", "--reference-spp"},
          bench_image},
-        {"filter", "the joint bilateral filter", {"--threads", "--size"}, bench_filter},
+        {"filter",
+         "the filters: their time, and with scenes the error before and after",
+         {"--threads", "--size", "--scenes", "--scene", "--spp", "--reference-spp"},
+         bench_filter},
         {"ledger", "tiles per second through ledger and schedule", {}, bench_ledger},
     };
     return table;

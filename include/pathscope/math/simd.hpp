@@ -1,5 +1,5 @@
 #pragma once
-/// Eight floats or doubles at once, and four floats: the only header with intrinsics.
+/// Eight floats or doubles at once, four floats, and as many floats as fit: the only header with intrinsics.
 ///
 ///     const Float8 t = (load(plane) - broadcast(origin)) * broadcast(inverse);
 ///     for (Lanes met = at_most(t_near, t_far); any(met); met = without_first(met)) visit(first(met));
@@ -362,6 +362,72 @@ inline void store(float* four, Float4 a) {
 }
 
 #endif
+
+// ---- As many floats as one register holds: for loops over pixels, where any number at once gives the same bits.
+
+#if PATHSCOPE_SIMD_AT_LEAST(avx512)
+
+struct Float16 {
+    __m512 lanes;
+};
+using Floats = Float16;
+
+/// At any address.
+[[nodiscard]] inline Floats load_floats(const float* many) { return {_mm512_loadu_ps(many)}; }
+inline void store_floats(float* many, Floats a) { _mm512_storeu_ps(many, a.lanes); }
+[[nodiscard]] inline Floats broadcast_floats(float a) { return {_mm512_set1_ps(a)}; }
+[[nodiscard]] inline Floats operator+(Floats a, Floats b) { return {_mm512_add_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Floats operator-(Floats a, Floats b) { return {_mm512_sub_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Floats operator*(Floats a, Floats b) { return {_mm512_mul_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Floats min(Floats a, Floats b) { return {_mm512_min_ps(a.lanes, b.lanes)}; }
+/// a 2^n, where n stands in the last bits of `n_below` as a whole number, as it does in 0x1.8p23f + n.
+/// Requires: the result is a normal number, or a is 1 and n is -127, which gives 0.
+[[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
+    const __m512i exponent = _mm512_slli_epi32(_mm512_castps_si512(n_below.lanes), 23);
+    return {_mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a.lanes), exponent))};
+}
+
+#elif PATHSCOPE_SIMD_AT_LEAST(avx2)
+
+using Floats = Float8;
+
+[[nodiscard]] inline Floats load_floats(const float* many) { return {_mm256_loadu_ps(many)}; }
+inline void store_floats(float* many, Floats a) { _mm256_storeu_ps(many, a.lanes); }
+[[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast(a); }
+[[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
+    const __m256i exponent = _mm256_slli_epi32(_mm256_castps_si256(n_below.lanes), 23);
+    return {_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a.lanes), exponent))};
+}
+
+#elif defined(__SSE4_1__)
+
+using Floats = Float4;
+
+[[nodiscard]] inline Floats load_floats(const float* many) { return {_mm_loadu_ps(many)}; }
+inline void store_floats(float* many, Floats a) { _mm_storeu_ps(many, a.lanes); }
+[[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast4(a); }
+[[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
+    const __m128i exponent = _mm_slli_epi32(_mm_castps_si128(n_below.lanes), 23);
+    return {_mm_castsi128_ps(_mm_add_epi32(_mm_castps_si128(a.lanes), exponent))};
+}
+
+#else
+
+using Floats = Float4;
+
+[[nodiscard]] inline Floats load_floats(const float* many) { return load4(many); }
+inline void store_floats(float* many, Floats a) { store(many, a); }
+[[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast4(a); }
+[[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
+    return lanewise::each(a, n_below, [](float x, float n) {
+        return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) +
+                                    (std::bit_cast<std::uint32_t>(n) << 23));
+    });
+}
+
+#endif
+
+inline constexpr std::size_t k_floats = sizeof(Floats) / sizeof(float);
 
 }  // namespace PATHSCOPE_SIMD
 }  // namespace pathscope

@@ -1,0 +1,25 @@
+#if defined(__x86_64__)
+
+// All that is shared with other instruction sets comes first.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // GCC 12 warns of its own header (its bug 105593).
+#include <immintrin.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "filter/tap_kernels.hpp"
+#include "pathscope/math/simd_level.hpp"
+
+#pragma GCC target("avx2,fma,bmi,avx512f,avx512vl")
+#define PATHSCOPE_SIMD avx512
+#include "filter/tap_kernel.hpp"
+
+namespace pathscope {
+const TapKernel& tap_kernel_avx512() { return avx512::k_tap_kernel; }
+}  // namespace pathscope
+
+#endif
