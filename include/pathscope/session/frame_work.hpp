@@ -10,7 +10,7 @@
 /// Why one place: a round is merged if and only if its ledger accepts it, so that committing and adding cannot drift
 /// apart. Which server renders what, and over which wire, is the session's business.
 /// Direct rounds are the client's own; only indirect ones are counted in the event store, since only they can be lost.
-/// Thread safety: one thread at a time.   Test: tests/session/test_frame_work.cpp
+/// Thread safety: one thread at a time.   Test: tests/session/test_frame_work.cpp, test_adaptive_frame.cpp
 
 #include <array>
 #include <cstdint>
@@ -40,7 +40,8 @@ class FrameWork {
     FrameWork(const WorkPlan& plan, EventStore& store);
 
     /// Begins the frame anew: nothing of the epoch before reaches it. Returns the leases that were outstanding. Who may be
-    /// given rounds has to be said again.
+    /// given rounds has to be said again. Requires: with passes, each part's samples are none or at least
+    /// least_staged_budget(round_samples).
     std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch, TimeNs now);
 
     /// Who may be given indirect rounds.
