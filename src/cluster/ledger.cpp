@@ -28,10 +28,11 @@ UnitReason reason_of(Verdict refusal) {
 
 }  // namespace
 
-SampleRange samples_of_round(const LedgerPlan& plan, std::uint32_t index) {
-    CHECK(index < plan.rounds_per_unit(), index, plan.samples, plan.round_samples);
-    const std::uint32_t first = index * plan.round_samples;
-    return {first, std::min(plan.round_samples, plan.samples - first)};
+SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round) {
+    CHECK(round.index < plan.rounds_of(round.unit), round.index, plan.samples, plan.round_samples);
+    const std::uint32_t size = plan.round_samples_of(round.unit);
+    const std::uint32_t first = round.index * size;
+    return {plan.first_sample(round.unit) + first, std::min(size, plan.samples - first)};
 }
 
 // -- Epochs and checkpoints ---------------------------------------------------------------------------------
@@ -39,13 +40,17 @@ SampleRange samples_of_round(const LedgerPlan& plan, std::uint32_t index) {
 std::vector<Lease> Ledger::new_epoch(const LedgerPlan& plan, TimeNs now) {
     CHECK(plan.epoch > plan_.epoch, plan.epoch, plan_.epoch);
     CHECK(plan.round_samples > 0 && plan.samples <= k_open_ended, plan.round_samples, plan.samples);
+    CHECK(plan.staged || plan.group_units == 0, plan.group_units);
+    CHECK(plan.group_units == 0 || plan.samples <= plan.group_samples, plan.samples, plan.group_samples);
     std::vector<Lease> dropped = outstanding_leases();
     for (const Lease& lease : dropped) note(lease, UnitChange::closed, UnitReason::new_epoch, now);
     counts_.dropped += dropped.size();
 
     plan_ = plan;
     stopped_ = false;
-    units_.assign(plan.units, {});
+    const std::uint32_t open_at_first = plan.staged ? 0 : plan.rounds_per_unit();
+    units_.assign(plan.units, Unit{open_at_first, 0, 0, {}});
+    open_ = std::uint64_t{plan.units} * open_at_first;
     active_.clear();
     records_.clear();
     deadlines_.clear();
@@ -59,6 +64,20 @@ std::vector<Lease> Ledger::new_epoch(const LedgerPlan& plan, TimeNs now) {
     return dropped;
 }
 
+void Ledger::open(std::uint32_t unit, std::uint32_t rounds) {
+    std::uint32_t& open = units_.at(unit).open;
+    CHECK(plan_.staged && rounds >= open && rounds <= plan_.rounds_of(unit), rounds, open);
+    open_ += rounds - open;
+    count(Counter::rounds, rounds - open, k_local_server);
+    open = rounds;
+}
+
+std::uint32_t Ledger::samples_before(std::uint32_t unit, std::uint32_t rounds) const {
+    if (rounds == 0) return 0;
+    const SampleRange last = samples_of_round(plan_, {unit, rounds - 1});
+    return last.first + last.count - plan_.first_sample(unit);
+}
+
 Result<void> Ledger::restore(std::uint32_t unit, const UnitSnapshot& snapshot) {
     if (unit >= plan_.units)
         return bad_input(
@@ -67,18 +86,15 @@ Result<void> Ledger::restore(std::uint32_t unit, const UnitSnapshot& snapshot) {
         return bad_input(fmt::format("The checkpoint has unit {} twice, or work on it has begun.", unit));
     const bool rising = std::adjacent_find(snapshot.missing.begin(), snapshot.missing.end(),
                                            std::greater_equal<>()) == snapshot.missing.end();
-    if (snapshot.reached > plan_.rounds_per_unit() || !rising ||
+    if (snapshot.reached > units_[unit].open || !rising ||
         (!snapshot.missing.empty() && snapshot.missing.back() >= snapshot.reached))
         return bad_input(fmt::format("The checkpoint's rounds of unit {} do not fit the plan.", unit));
 
     Unit& account = units_[unit];
     account.fresh = snapshot.reached;
-    if (snapshot.reached > 0) {
-        const SampleRange last = samples_of_round(plan_, snapshot.reached - 1);
-        account.samples = last.first + last.count;
-    }
+    account.samples = samples_before(unit, snapshot.reached);
     for (const std::uint32_t index : snapshot.missing) {
-        account.samples -= samples_of_round(plan_, index).count;
+        account.samples -= samples_of_round(plan_, {unit, index}).count;
         active_[{unit, index}];
         reopened_.push_back({unit, index});
     }
@@ -103,7 +119,7 @@ UnitSnapshot Ledger::snapshot(std::uint32_t unit) const {
 std::optional<Lease> Ledger::grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration) {
     if (stopped_ || round.unit >= plan_.units) return std::nullopt;
     Unit& unit = units_[round.unit];
-    if (round.index == unit.fresh && round.index < plan_.rounds_per_unit()) {
+    if (round.index == unit.fresh && round.index < unit.open) {
         ++unit.fresh;
         ++begun_;
         if (plan_.open_ended()) count(Counter::rounds, 1, k_local_server);
@@ -142,7 +158,7 @@ Lease Ledger::hold(Active& active, ServerId server, RoundKey round, TimeNs now, 
     CHECK(duration > 0, duration);
     if (active.leases.size() == k_leases_per_round) forget_one_ended(active);
     const bool copy = reason == UnitReason::straggler;
-    const SampleRange samples = samples_of_round(plan_, round.index);
+    const SampleRange samples = samples_of_round(plan_, round);
     const Lease lease{
         LeaseId{++last_lease_}, plan_.epoch, round.unit, samples.first, samples.count, server, now,
         now + duration,         copy};
@@ -189,9 +205,9 @@ Verdict Ledger::judge(const ResultClaim& claim) const {
     if (const auto found = records_.find(claim.lease); found != records_.end())
         return claim == claim_of(found->second.lease) ? Verdict::accepted : Verdict::mismatched;
 
-    const RoundKey round{claim.unit, claim.first / plan_.round_samples};
-    if (round.unit >= plan_.units || round.index >= plan_.rounds_per_unit() ||
-        samples_of_round(plan_, round.index) != SampleRange{claim.first, claim.count})
+    const RoundKey round = round_at(claim.unit, claim.first);
+    if (round.unit >= plan_.units || round.index >= units_[round.unit].open ||
+        samples_of_round(plan_, round) != SampleRange{claim.first, claim.count})
         return Verdict::mismatched;
     return committed(round) ? Verdict::duplicate : Verdict::unknown;
 }
@@ -333,12 +349,12 @@ bool Ledger::committed(RoundKey round) const {
 
 bool Ledger::complete() const {
     if (stopped_) return outstanding_ == 0;
-    return committed_ == std::uint64_t{plan_.units} * plan_.rounds_per_unit();
+    return committed_ == open_;
 }
 
 std::optional<RoundKey> Ledger::next_fresh(std::uint32_t unit) const {
     const std::uint32_t index = units_.at(unit).fresh;
-    if (stopped_ || index >= plan_.rounds_per_unit()) return std::nullopt;
+    if (stopped_ || index >= units_[unit].open) return std::nullopt;
     return RoundKey{unit, index};
 }
 
@@ -379,9 +395,7 @@ std::optional<TimeNs> Ledger::next_deadline() const {
     return deadlines_.begin()->first;
 }
 
-std::uint64_t Ledger::rounds() const {
-    return plan_.open_ended() ? begun_ : std::uint64_t{plan_.units} * plan_.rounds_per_unit();
-}
+std::uint64_t Ledger::rounds() const { return plan_.open_ended() ? begun_ : open_; }
 
 // -- Audit --------------------------------------------------------------------------------------------------
 
@@ -446,20 +460,23 @@ Result<void> Ledger::audit_records() const {
 }
 
 Result<void> Ledger::audit_units() const {
-    std::uint64_t committed = 0;
+    std::uint64_t committed = 0, open = 0;
     for (std::uint32_t unit = 0; unit < plan_.units; ++unit) {
         const UnitSnapshot account = snapshot(unit);
-        std::uint32_t samples = 0;
-        if (account.reached > 0) {
-            const SampleRange last = samples_of_round(plan_, account.reached - 1);
-            samples = last.first + last.count;
-        }
-        for (const std::uint32_t index : account.missing) samples -= samples_of_round(plan_, index).count;
+        open += units_[unit].open;
+        if (account.reached > units_[unit].open)
+            return failed(fmt::format("Ledger: {} rounds of unit {} were granted, but {} are open.",
+                                      account.reached, unit, units_[unit].open));
+        std::uint32_t samples = samples_before(unit, account.reached);
+        for (const std::uint32_t index : account.missing)
+            samples -= samples_of_round(plan_, {unit, index}).count;
         if (samples != units_[unit].samples)
             return failed(fmt::format("Ledger: unit {} has {} samples in its rounds, {} in its account.",
                                       unit, samples, units_[unit].samples));
         committed += account.reached - account.missing.size();
     }
+    if (open != open_)
+        return failed(fmt::format("Ledger: the units have {} open rounds, the account {}.", open, open_));
     if (committed != committed_)
         return failed(fmt::format("Ledger: the units hold {} committed rounds, the account {}.", committed,
                                   committed_));

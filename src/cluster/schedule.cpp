@@ -148,8 +148,9 @@ void Schedule::make_walks() {
 std::optional<RoundKey> Schedule::pick(const Ledger& ledger, ServerId server) {
     CHECK(ledger.plan().units == unit_order_.size(), ledger.plan().units, unit_order_.size());
     if (ledger.stopped() || !contains(alive_, server)) return std::nullopt;
-    if (ledger.plan().epoch != epoch_) {
+    if (ledger.plan().epoch != epoch_ || ledger.rounds_open() != rounds_open_) {
         epoch_ = ledger.plan().epoch;
+        rounds_open_ = ledger.rounds_open();
         make_walks();
     }
     for (const RoundKey& round : ledger.reopened())
@@ -189,7 +190,7 @@ std::optional<RoundKey> pick_straggler(const Ledger& ledger, ServerId server, Ti
     if (!oldest || ledger.stopped()) return std::nullopt;
     const double age = static_cast<double>(now - oldest->granted);
     if (age <= k_straggler_factor * static_cast<double>(own_estimate)) return std::nullopt;
-    return RoundKey{oldest->unit, oldest->first / ledger.plan().round_samples};
+    return ledger.key_of(*oldest);
 }
 
 }  // namespace pathscope

@@ -72,7 +72,7 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
       wake_(std::move(wake)),
       session_(random_session()),
       heartbeat_(heartbeat_of(config.detector)),
-      work_({config.block_size, config.round_samples, config.schedule, config.order}, store),
+      work_({config.block_size, config.round_samples, config.schedule, config.order, config.sampling}, store),
       runner_(wake_, config.threads) {
     started_ = last_step_ = monotonic_now();
     store_.name_server(k_local_server, "client");
@@ -623,7 +623,7 @@ void ClientSession::on(Server& server, message::Tile& tile) {
         work_.commit(LightPart::indirect, claim, {}, now);
         return;
     }
-    const std::int64_t pixels = work_.indirect().grid().rect(tile.unit).area();
+    const std::int64_t pixels = work_.rect_of(tile.unit).area();
     RoundResult result;
     result.rays = tile.rays;
     result.samples = std::uint64_t(pixels) * tile.count;

@@ -2,6 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+
+#include "pathscope/core/check.hpp"
 #include "pathscope/session/build_identity.hpp"
 
 namespace pathscope {
@@ -34,6 +37,14 @@ Json servers_json(const EventStore& store) {
 
 }  // namespace
 
+SamplesPerPixel summary_of(const Plane& samples) {
+    CHECK(!samples.pixels.empty());
+    const auto [least, most] = std::minmax_element(samples.pixels.begin(), samples.pixels.end());
+    double sum = 0;
+    for (const float n : samples.pixels) sum += double(n);
+    return {double(*least), sum / double(samples.pixels.size()), double(*most)};
+}
+
 std::string stats_json(const RenderState& state, const EventStore& store, const RunFigures& figures) {
     const CounterTotals totals = store.totals();
     const auto total = [&](Counter counter) { return totals[std::size_t(counter)]; };
@@ -57,6 +68,10 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"samples", total(Counter::samples)},
               {"samples_per_s", per_second(total(Counter::samples), figures.render_s)},
               {"image_hash", to_hex(figures.image_hash)},
+              {"estimated_error", figures.estimated_error ? Json(*figures.estimated_error) : Json()},
+              {"samples_per_pixel_min", figures.samples_per_pixel.min},
+              {"samples_per_pixel_mean", figures.samples_per_pixel.mean},
+              {"samples_per_pixel_max", figures.samples_per_pixel.max},
               {"quantum_exponent", state.settings.quantum.exponent},
               {"servers", servers_json(store)},
               {"client",

@@ -49,13 +49,60 @@ std::vector<UnitReason> reasons_in(const EventStore& store) {
 
 }  // namespace
 
+TEST_CASE("a staged plan grants what is open, group by group with samples of its own") {
+    LedgerPlan plan = plan_of(4, 6, 4);  // Two blocks, each a unit of two groups.
+    plan.staged = true;
+    plan.group_units = 2;
+    plan.group_samples = 100;
+    EventStore store;
+    Ledger ledger = ledger_of(plan, &store);
+    CHECK(ledger.complete());
+    CHECK(!ledger.grant(k_a, {0, 0}, 0, k_lease));
+    CHECK(!ledger.next_fresh(0));
+
+    ledger.open(1, 2);
+    ledger.open(3, 3);
+    CHECK(ledger.rounds() == 5);
+    CHECK(store.total(Counter::rounds) == 5);
+    CHECK(!ledger.complete());
+    CHECK(!ledger.grant(k_a, {0, 0}, 0, k_lease));
+    std::vector<Lease> leases;
+    for (const std::uint32_t unit : {1u, 3u})
+        while (const auto next = ledger.next_fresh(unit))
+            leases.push_back(ledger.grant(k_a, *next, 0, k_lease).value());
+    REQUIRE(leases.size() == 5);
+    const SampleRange expected[] = {{0, 4}, {4, 2}, {100, 1}, {101, 1}, {102, 1}};
+    for (std::size_t i = 0; i < leases.size(); ++i) {
+        CHECK(SampleRange{leases[i].first, leases[i].count} == expected[i]);
+        CHECK(ledger.key_of(leases[i]) == RoundKey{i < 2 ? 1u : 3u, std::uint32_t(i < 2 ? i : i - 2)});
+        CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::accepted);
+        CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::duplicate);
+        check_audit(ledger);
+    }
+    CHECK(ledger.complete());
+    CHECK(ledger.samples_committed(1) == 6);
+    CHECK(ledger.samples_committed(3) == 3);
+
+    // A round that is not open, one of the other group's numbers, and one before a group's first.
+    ResultClaim claim = claim_of(leases[4]);
+    claim.first = 103;
+    CHECK(verdict_of(ledger, claim) == Verdict::mismatched);
+    claim.first = 0;
+    CHECK(verdict_of(ledger, claim) == Verdict::mismatched);
+    ledger.open(3, 4);
+    CHECK(!ledger.complete());
+    CHECK(ledger.next_fresh(3) == RoundKey{3, 3});
+    CHECK(!ledger.next_fresh(1));
+    check_audit(ledger);
+}
+
 TEST_CASE("rounds cut a unit's samples without gap or overlap") {
     for (const std::uint32_t samples : {0u, 1u, 3u, 4u, 5u, 64u, 65u})
         for (const std::uint32_t round_samples : {1u, 3u, 4u, 100u}) {
             const LedgerPlan plan = plan_of(1, samples, round_samples);
             std::uint32_t next = 0;
             for (std::uint32_t i = 0; i < plan.rounds_per_unit(); ++i) {
-                const SampleRange range = samples_of_round(plan, i);
+                const SampleRange range = samples_of_round(plan, {0, i});
                 CHECK(range.first == next);
                 CHECK(range.count > 0);
                 CHECK(range.count <= round_samples);

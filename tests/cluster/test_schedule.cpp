@@ -221,3 +221,27 @@ TEST_CASE("an idle server copies the oldest lease, once that is old enough") {
     CHECK_FALSE(pick_straggler(ledger, k_b, 500 * k_second_ns, own)
                     .has_value());  // its own is no straggler to itself
 }
+
+TEST_CASE("every kind of schedule finds the rounds that a staged plan opens later") {
+    for (const auto& [kind, name] : k_schedule_names) {
+        CAPTURE(name);
+        LedgerPlan plan{Epoch{1}, 6, 8, 1};
+        plan.staged = true;
+        Ledger ledger;
+        ledger.new_epoch(plan, 0);
+        Schedule schedule = schedule_of(kind, 6, {{k_a, 1}, {k_b, 2}});
+        CHECK(!schedule.pick(ledger, k_a));
+        for (const std::uint32_t stage : {1u, 3u, 8u}) {
+            for (const std::uint32_t unit : {0u, 2u, 3u, 5u}) ledger.open(unit, stage);
+            int picked = 0;
+            for (const ServerId server : {k_a, k_b})
+                while (const auto round = schedule.pick(ledger, server)) {
+                    CHECK(round->index < stage);
+                    commit(ledger, ledger.grant(server, *round, 0, k_lease).value());
+                    ++picked;
+                }
+            CHECK(picked == 4 * int(stage == 1 ? 1 : stage == 3 ? 2 : 5));
+            CHECK(ledger.complete());
+        }
+    }
+}

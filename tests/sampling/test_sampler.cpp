@@ -214,6 +214,29 @@ TEST_CASE("sobol beats independent on a smooth integrand: variance at 256 sample
     CHECK(variance[1] < variance[0] / 1000);
 }
 
+TEST_CASE("sequences of a pixel err on their own: the means of their first samples are not correlated") {
+    // Over n pixels the correlation of independent means has a standard deviation of 1 / sqrt(n). Two halves of one
+    // sequence of sobol would give -0.9 here: they share its strata.
+    constexpr int k_pixels = 20'000;
+    for (const SamplerKind kind : k_kinds)
+        for (const std::uint32_t other : {1u, 2u, 3u}) {
+            double covariance = 0, variance = 0;
+            for (int x = 0; x < k_pixels; ++x) {
+                const auto mean = [&](std::uint32_t sequence) {
+                    double sum = 0;
+                    for (std::uint32_t s = 0; s < 2; ++s)
+                        sum +=
+                            double(PixelSampler(kind, 1, x, 0, sequence * k_sequence_samples + s).get_1d(3));
+                    return sum / 2 - 0.5;
+                };
+                const double a = mean(0), b = mean(other);
+                covariance += a * b;
+                variance += a * a;
+            }
+            CHECK(std::abs(covariance / variance) < 4 / std::sqrt(double(k_pixels)));
+        }
+}
+
 TEST_CASE("numbers stay below 1 and are multiples of 2^-24") {
     for (const SamplerKind kind : k_kinds)
         for (std::uint32_t s = 0; s < 100'000; ++s) {

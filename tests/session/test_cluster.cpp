@@ -202,6 +202,35 @@ TEST_CASE("an input in mid-frame reaches the servers, and no result of the old e
     CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
 }
 
+TEST_CASE("adaptive rounds have the same bits alone and with servers, scouts travelling over the wire") {
+    SmallJob small(24);
+    small.state.settings.direct_spp = 8;
+    const TemporaryFolder cache;
+    std::vector<Digest> hashes;
+    std::vector<std::optional<double>> errors;
+    for (const int servers : {0, 1, 3}) {
+        EventStore store;
+        ClientConfig config = listening(servers);
+        config.sampling.adaptive = true;
+        const auto client = std::move(*ClientSession::create(config, small.job(), store));
+        std::vector<std::unique_ptr<RunningServer>> running;
+        for (int i = 0; i < servers; ++i)
+            running.push_back(std::make_unique<RunningServer>(ports_of(*client), cache.path()));
+        REQUIRE(finish(*client));
+        CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
+        CHECK(store.total(Counter::bad_messages) == 0);
+        CHECK(bool(client->work().indirect_ledger().audit()));
+        if (servers > 0) CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
+        hashes.push_back(hash_of(*client));
+        errors.push_back(client->work().estimated_error());
+    }
+    CHECK(errors[0].value() > 0);
+    for (std::size_t i = 1; i < hashes.size(); ++i) {
+        CHECK(hashes[i] == hashes[0]);
+        CHECK(errors[i] == errors[0]);
+    }
+}
+
 TEST_CASE("a server that loses its client waits for the next one, and serves it") {
     const SmallJob small;
     const TemporaryFolder cache;

@@ -39,6 +39,10 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
                             "samples",
                             "samples_per_s",
                             "image_hash",
+                            "estimated_error",
+                            "samples_per_pixel_min",
+                            "samples_per_pixel_mean",
+                            "samples_per_pixel_max",
                             "servers",
                             "rounds",
                             "rounds_committed",
@@ -58,6 +62,7 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
     CHECK(json["spp"] == 8);
     CHECK(json["seed"] == 7);
     CHECK(json["servers"] == Json::array());
+    CHECK(json["estimated_error"].is_null());
     CHECK(json["rays_per_s"] == 0);  // And not a division by no time, which JSON cannot say.
 }
 
@@ -73,6 +78,11 @@ TEST_CASE("the numbers are those of the store, each counter under its own key") 
     figures.threads = 3;
     figures.image_hash = hash_text("image");
     figures.saturated = 5;
+    figures.estimated_error = 0.125;
+    Plane samples(2, 2, 4.0f);
+    samples.at(1, 0) = 2;
+    samples.at(0, 1) = 10;
+    figures.samples_per_pixel = summary_of(samples);
     figures.dropped = {{3, 4, 17}};
     const Json json = Json::parse(stats_json(small_state(), store, figures));
 
@@ -88,6 +98,10 @@ TEST_CASE("the numbers are those of the store, each counter under its own key") 
     CHECK(json["rays_per_s"] == double(store.total(Counter::rays)) / 4);
     CHECK(json["samples_per_s"] == double(store.total(Counter::samples)) / 4);
     CHECK(json["image_hash"] == to_hex(figures.image_hash));
+    CHECK(json["estimated_error"] == 0.125);
+    CHECK(json["samples_per_pixel_min"] == 2);
+    CHECK(json["samples_per_pixel_mean"] == 5);
+    CHECK(json["samples_per_pixel_max"] == 10);
     CHECK(json["saturated"] == 5);
     CHECK(json["dropped_samples"] == Json::parse(R"([{"x": 3, "y": 4, "sample": 17}])"));
 }

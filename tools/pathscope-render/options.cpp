@@ -24,6 +24,15 @@ void add_image_options(CLI::App& app, RenderOptions& options) {
     app.add_option("--direct-spp", options.direct_spp, "direct samples per pixel (as --spp)")
         ->check(samples)
         ->type_name("N");
+    app.add_option_function<std::string>(
+           "--adaptive", [&](const std::string& word) { options.client.sampling.adaptive = word == "on"; },
+           "samples where the error is; --spp is the mean (off)")
+        ->check(CLI::IsMember({"on", "off"}))
+        ->type_name("on|off");
+    app.add_option("--target-error", options.client.sampling.target_error,
+                   "stop at this estimated relative error; --spp is the most (none)")
+        ->check(CLI::Range(1e-6, 1e6))
+        ->type_name("E");
     app.add_option_function<double>(
            "--seconds", [&](double seconds) { options.client.time_limit = from_seconds(seconds); },
            "stop after this time instead")
@@ -110,6 +119,19 @@ bool is_loopback(const std::string& host) {
     return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
 }
 
+/// What --adaptive and --target-error need of other flags.
+Result<void> check_sampling(const RenderOptions& options) {
+    const ClientConfig& client = options.client;
+    if (!client.sampling.staged()) return {};
+    const char* flag = client.sampling.adaptive ? "--adaptive on" : "--target-error";
+    if (options.settings.filter == FilterPlace::server)
+        return bad_input(
+            fmt::format("{}: with --filter server tiles come filtered, and noise cannot be measured. Use "
+                        "--filter client.",
+                        flag));
+    return {};
+}
+
 }  // namespace
 
 Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const char* const* argv) {
@@ -138,6 +160,7 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     if (*text) return std::variant<RenderOptions, std::string>(**text);
 
     options.mesh_cache = mesh_cache_of(options.client.local_server_mesh_cache, SceneCache::default_folder());
+    if (const auto fits = check_sampling(options); !fits) return fits.error();
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (options.client.listens) {
         if (!is_loopback(options.client.host) && !insecure)

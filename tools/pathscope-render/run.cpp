@@ -13,6 +13,7 @@
 #include "pathscope/image/io.hpp"
 #include "pathscope/probe/trace_export.hpp"
 #include "pathscope/render/rendered_frame.hpp"
+#include "pathscope/sampling/sampler.hpp"
 #include "pathscope/session/client_session.hpp"
 #include "pathscope/session/stats.hpp"
 #include "progress_line.hpp"
@@ -72,6 +73,24 @@ Result<RenderState> make_state(const RenderOptions& options, const SceneFile& fi
     if (options.indirect_only) settings.direct_spp = 0;
     settings.quantum = quantum_for(scene.typical_radiance, scene.brightest_radiance);
     return state;
+}
+
+/// A budget that passes cannot be made of is refused with the numbers that it would need.
+Result<void> check_budget(const ClientConfig& client, const RenderSettings& settings) {
+    if (!client.sampling.staged()) return {};
+    const std::uint32_t least = least_staged_budget(client.round_samples);
+    for (const auto& [flag, samples] :
+         {std::pair("--spp", settings.spp), std::pair("--direct-spp", settings.direct_spp)}) {
+        if (samples > 0 && samples < least)
+            return bad_input(
+                fmt::format("{} {}: --adaptive on and --target-error need at least {} with --round {}: a "
+                            "round, and the samples that measure noise.",
+                            flag, samples, least, client.round_samples));
+        if (samples > k_sequence_samples && client.time_limit == 0)
+            return bad_input(fmt::format("{} {}: --adaptive on and --target-error take at most {}.", flag,
+                                         samples, k_sequence_samples));
+    }
+    return {};
 }
 
 /// The layers of an .exr; the first is what .png and .pfm hold. Pictures live as long as `buffers`.
@@ -138,6 +157,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     const TimeNs built = monotonic_now();
     const Result<RenderState> state = make_state(options, opened->file, *scene);
     if (!state) return state.error();
+    if (const auto fits = check_budget(options.client, state->settings); !fits) return fits;
 
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
@@ -169,6 +189,8 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     figures.render_s = to_seconds(rendered - built);
     figures.threads = options.client.threads > 0 ? options.client.threads : hardware_threads();
     figures.image_hash = image_hash(buffers.frame.combined);
+    figures.estimated_error = work.estimated_error();
+    figures.samples_per_pixel = summary_of(buffers.samples);
     figures.saturated = (*session)->saturated();
     figures.dropped = (*session)->dropped();
     session->reset();  // Ends the local servers.

@@ -21,6 +21,11 @@
 ///   bounded   records exist only for rounds that were granted and are not committed, at most
 ///             k_leases_per_round each; a committed round is remembered by what is *absent*
 ///
+/// Stages: the rounds of a staged plan are opened bit by bit, unit by unit, by open(); the account is complete whenever
+/// all that are open are committed. Its units come in groups of equal size, whose samples are numbered apart, so that
+/// the same block can be several units (cluster/adaptive.hpp); only the first group has rounds of round_samples, all
+/// others go sample by sample.
+///
 /// How a duplicate is known without a record of it: a unit's rounds are first granted in rising order, so
 /// `index < fresh` means "was granted", and without a record, "is committed".
 ///
@@ -54,10 +59,26 @@ struct LedgerPlan {
     std::uint32_t units = 0;
     std::uint32_t samples = 0;        ///< Per unit; k_open_ended to go on until stop().
     std::uint32_t round_samples = 1;  ///< At least 1.
+    // Staged plans only.
+    bool staged = false;              ///< No round is open at first.
+    std::uint32_t group_units = 0;    ///< Units of one group; 0 = all are one.
+    std::uint32_t group_samples = 0;  ///< The samples of group i are numbered from i * group_samples on.
 
     [[nodiscard]] bool open_ended() const { return samples == k_open_ended; }
-    [[nodiscard]] std::uint32_t rounds_per_unit() const {
-        return samples / round_samples + (samples % round_samples != 0 ? 1 : 0);
+    [[nodiscard]] std::uint32_t rounds_per_unit() const { return rounds_of(0); }
+    [[nodiscard]] std::uint32_t group_of(std::uint32_t unit) const {
+        return group_units == 0 ? 0 : unit / group_units;
+    }
+    [[nodiscard]] std::uint32_t first_sample(std::uint32_t unit) const {
+        return group_of(unit) * group_samples;
+    }
+    [[nodiscard]] std::uint32_t round_samples_of(std::uint32_t unit) const {
+        return group_of(unit) == 0 ? round_samples : 1;
+    }
+    /// The most rounds that a unit can have.
+    [[nodiscard]] std::uint32_t rounds_of(std::uint32_t unit) const {
+        const std::uint32_t size = round_samples_of(unit);
+        return samples / size + (samples % size != 0 ? 1 : 0);
     }
 };
 
@@ -74,8 +95,8 @@ struct SampleRange {
     bool operator==(const SampleRange&) const = default;
 };
 
-/// Requires: index < plan.rounds_per_unit().
-[[nodiscard]] SampleRange samples_of_round(const LedgerPlan& plan, std::uint32_t index);
+/// Requires: round.index < plan.rounds_of(round.unit).
+[[nodiscard]] SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round);
 
 /// A round granted to one server until a deadline.
 struct Lease {
@@ -170,6 +191,10 @@ class Ledger {
     [[nodiscard]] Result<void> restore(std::uint32_t unit, const UnitSnapshot& committed);
     [[nodiscard]] UnitSnapshot snapshot(std::uint32_t unit) const;
 
+    /// Opens rounds of a staged plan: the unit shall have so many in all. Requires: no fewer than before, and at most
+    /// plan().rounds_of(unit).
+    void open(std::uint32_t unit, std::uint32_t rounds);
+
     /// No more grants; results of leases already granted are still welcome.
     void stop() { stopped_ = true; }
 
@@ -200,8 +225,13 @@ class Ledger {
     // -- View (schedules, panels, statistics) ---------------------------------------------------------------
     [[nodiscard]] const LedgerPlan& plan() const { return plan_; }
     [[nodiscard]] bool stopped() const { return stopped_; }
+    [[nodiscard]] RoundKey key_of(const Lease& lease) const { return round_at(lease.unit, lease.first); }
 
-    /// Nothing is left to wait for: all rounds are committed or, after stop(), no lease is outstanding.
+    /// Rounds that may be granted or were; grows only by open().
+    [[nodiscard]] std::uint64_t rounds_open() const { return open_; }
+    [[nodiscard]] std::uint32_t rounds_open(std::uint32_t unit) const { return units_.at(unit).open; }
+
+    /// Nothing is left to wait for: all open rounds are committed or, after stop(), no lease is outstanding.
     [[nodiscard]] bool complete() const;
 
     /// The unit's lowest round that was never granted.
@@ -224,7 +254,7 @@ class Ledger {
     /// The next moment at which expire() has something to do.
     [[nodiscard]] std::optional<TimeNs> next_deadline() const;
 
-    [[nodiscard]] std::uint64_t rounds() const;  ///< Planned in this epoch; open-ended: begun.
+    [[nodiscard]] std::uint64_t rounds() const;  ///< Open in this epoch; open-ended: begun.
     [[nodiscard]] std::uint64_t rounds_committed() const { return committed_; }
     [[nodiscard]] std::uint32_t samples_committed(std::uint32_t unit) const {
         return units_.at(unit).samples;
@@ -237,6 +267,7 @@ class Ledger {
 
   private:
     struct Unit {
+        std::uint32_t open = 0;     ///< Rounds [0, open) may be granted.
         std::uint32_t fresh = 0;    ///< Rounds [0, fresh) were granted or restored.
         std::uint32_t samples = 0;  ///< Committed.
         ServerId owner;             ///< Of the newest lease.
@@ -255,9 +286,11 @@ class Ledger {
     };
 
     [[nodiscard]] bool committed(RoundKey round) const;
-    [[nodiscard]] RoundKey key_of(const Lease& lease) const {
-        return {lease.unit, lease.first / plan_.round_samples};
+    /// Wraps around to an index that no plan has if `first` lies before the unit's samples.
+    [[nodiscard]] RoundKey round_at(std::uint32_t unit, std::uint32_t first) const {
+        return {unit, (first - plan_.first_sample(unit)) / plan_.round_samples_of(unit)};
     }
+    [[nodiscard]] std::uint32_t samples_before(std::uint32_t unit, std::uint32_t rounds) const;
     Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration,
                UnitReason reason);
     void forget_one_ended(Active& active);
@@ -282,6 +315,7 @@ class Ledger {
     std::map<ServerId, std::uint32_t> held_;          ///< Outstanding leases by server, no zeros.
     std::deque<RoundKey> reopened_;
     std::size_t outstanding_ = 0;
+    std::uint64_t open_ = 0;       ///< Of all units.
     std::uint64_t committed_ = 0;  ///< Rounds of this epoch.
     std::uint64_t begun_ = 0;
     std::uint64_t restored_ = 0;

@@ -100,6 +100,7 @@ class Schedule {
     std::vector<ServerId> owner_of_unit_;
     std::map<ServerId, Walk> walks_;  ///< By owner.
     Epoch epoch_;
+    std::uint64_t rounds_open_ = 0;  ///< When the walks were begun.
 };
 
 /// The straggler's round that a server with nothing else to do had better compute too: the oldest lease that

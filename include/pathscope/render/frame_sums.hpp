@@ -28,6 +28,10 @@ class FrameSums {
     void add(const Round& round, std::span<const PixelSum> sums);
 
     [[nodiscard]] const BlockGrid& grid() const { return grid_; }
+    [[nodiscard]] Quantum quantum() const { return quantum_; }
+    [[nodiscard]] const PixelSum& sum_at(int x, int y) const {
+        return sums_[std::size_t(y) * std::size_t(grid_.width()) + std::size_t(x)];
+    }
     [[nodiscard]] std::uint32_t samples_of_block(std::uint32_t block) const { return samples_[block]; }
     [[nodiscard]] Image mean() const;  ///< Black where there is no sample.
     [[nodiscard]] Plane samples() const;

@@ -16,6 +16,9 @@
 ///   smooth integrands falls nearly with 1/n^1.5. Pairs (and pixels) are decorrelated by visiting the
 ///   sequence in differently scrambled order ("padding"), which keeps all of the above.
 ///
+/// Sequences: samples [i, i + 1) * k_sequence_samples are sequence i. Sequences of one pixel are independent of each
+/// other, as those of two pixels are: so one may decide how long another goes on, and not bias it (cluster/adaptive.hpp).
+///
 /// Units: floats uniform in [0, 1), multiples of 2^-24 (what tables of sampling/distribution.hpp count on).
 /// See:   Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4); the scramble's constants are those
 ///        of Vegdahl 2021, "Building a Better LK Hash"; Laine & Karras 2011 had the idea.
@@ -36,6 +39,8 @@ inline constexpr std::array k_sampler_names{
     EnumName<SamplerKind>{SamplerKind::sobol, "sobol"},
 };
 constexpr const auto& enum_table(SamplerKind) { return k_sampler_names; }
+
+inline constexpr std::uint32_t k_sequence_samples = 1u << 18;
 
 [[nodiscard]] constexpr std::uint32_t reverse_bits(std::uint32_t x) {
     x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
@@ -71,8 +76,9 @@ constexpr const auto& enum_table(SamplerKind) { return k_sampler_names; }
 class PixelSampler {
   public:
     PixelSampler(SamplerKind kind, std::uint32_t seed, int x, int y, std::uint32_t sample)
-        : kind_(kind), sample_(sample) {
-        pixel_key_ = hash_combine(hash_combine(hash_u32(seed), std::uint32_t(x)), std::uint32_t(y));
+        : kind_(kind), sample_(sample % k_sequence_samples) {
+        const std::uint32_t sequence_seed = seed + sample / k_sequence_samples * k_sequence_salt;
+        pixel_key_ = hash_combine(hash_combine(hash_u32(sequence_seed), std::uint32_t(x)), std::uint32_t(y));
     }
 
     [[nodiscard]] float get_1d(std::uint32_t dimension) const {
@@ -92,6 +98,7 @@ class PixelSampler {
     }
 
   private:
+    static constexpr std::uint32_t k_sequence_salt = 0x9e3779b1u;
     static constexpr std::uint32_t k_second_salt = 0x68bc21ebu;
     static constexpr std::uint32_t k_first_salt = 0x02e5be93u;
 

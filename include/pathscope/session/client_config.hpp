@@ -1,6 +1,7 @@
 #pragma once
 /// How a client session runs: where it listens, which servers it starts, how it hands out work and when it stops.
-/// None of this changes a pixel; what does is in render_state.hpp.
+/// None of this changes a pixel, but for `sampling`; what else does is in render_state.hpp. How many samples a block gets
+/// is decided here alone, so that servers need not know the rule.
 
 #include <array>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <string>
 
 #include "pathscope/bvh/tree.hpp"
+#include "pathscope/cluster/adaptive.hpp"
 #include "pathscope/cluster/failure_detector.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
@@ -35,6 +37,7 @@ struct ClientConfig {
     UnitOrder order = UnitOrder::spiral;
     int block_size = 32;
     std::uint32_t round_samples = 4;
+    SamplingRule sampling{};
 
     int threads = 0;                 ///< Of the client's own rendering; 0 = all cores.
     TreeKind tree = TreeKind::wide;  ///< Of the scene that the local servers build.

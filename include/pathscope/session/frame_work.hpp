@@ -3,15 +3,22 @@
 ///
 ///     image = direct / n_direct + indirect / n_indirect
 ///
+/// With a sampling rule that asks for it, the frame goes in passes: scouts are rendered beside the picture, and when all
+/// rounds of a pass are committed they decide what the next one holds, or that there is none (cluster/adaptive.hpp).
+/// Unit u of a ledger is then block u mod n of the grid's n, of the picture if u < n, else of a half of the scout.
+///
 /// Why one place: a round is merged if and only if its ledger accepts it, so that committing and adding cannot drift
 /// apart. Which server renders what, and over which wire, is the session's business.
 /// Direct rounds are the client's own; only indirect ones are counted in the event store, since only they can be lost.
-/// Thread safety: one thread at a time.   Test: tests/session/test_frame_work.cpp
+/// Thread safety: one thread at a time.   Test: tests/session/test_frame_work.cpp, test_adaptive_frame.cpp
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "pathscope/cluster/adaptive.hpp"
 #include "pathscope/cluster/ledger.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/integrator/path_estimator.hpp"
@@ -25,6 +32,7 @@ struct WorkPlan {
     std::uint32_t round_samples = 4;
     ScheduleKind schedule = ScheduleKind::pull;
     UnitOrder order = UnitOrder::spiral;
+    SamplingRule sampling{};
 };
 
 class FrameWork {
@@ -32,7 +40,8 @@ class FrameWork {
     FrameWork(const WorkPlan& plan, EventStore& store);
 
     /// Begins the frame anew: nothing of the epoch before reaches it. Returns the leases that were outstanding. Who may be
-    /// given rounds has to be said again.
+    /// given rounds has to be said again. Requires: with passes, each part's samples are none or at least
+    /// least_staged_budget(round_samples).
     std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch, TimeNs now);
 
     /// Who may be given indirect rounds.
@@ -52,8 +61,10 @@ class FrameWork {
     }
 
     [[nodiscard]] Round round_of(const Lease& lease) const {
-        return grid_.round(lease.unit, lease.first, lease.count);
+        return grid_.round(block_of(lease.unit), lease.first, lease.count);
     }
+    /// Requires: a unit of a ledger's plan.
+    [[nodiscard]] PixelRect rect_of(std::uint32_t unit) const { return grid_.rect(block_of(unit)); }
 
     /// Books a result and, if it is accepted, adds its light.
     Commit commit(LightPart part, const ResultClaim& claim, std::span<const PixelSum> sums, TimeNs now);
@@ -70,6 +81,11 @@ class FrameWork {
     [[nodiscard]] bool direct_complete() const { return complete(direct_); }
     [[nodiscard]] bool complete() const { return complete(direct_) && complete(indirect_); }
 
+    /// Relative, of the image as it stands, by the scouts of the last finished pass. Nothing without passes, before the
+    /// first is finished, and while a block has no sample.
+    [[nodiscard]] std::optional<double> estimated_error() const;
+    [[nodiscard]] std::uint32_t passes_finished() const { return passes_finished_; }
+
     /// Whether each block has at least one round of each part that is asked for: only then a picture can be made.
     [[nodiscard]] bool has_image() const { return has_image(direct_) && has_image(indirect_); }
 
@@ -79,12 +95,26 @@ class FrameWork {
   private:
     struct Part {
         Ledger ledger;
-        FrameSums sums;
-        std::uint32_t samples = 0;
-        std::uint32_t units_begun = 0;  ///< Blocks with at least one round committed.
+        FrameSums sums{};
+        std::uint32_t samples = 0;      ///< Budget, per pixel.
+        std::uint32_t units_begun = 0;  ///< Blocks with at least one round of picture committed.
+        std::array<FrameSums, 2> scouts{};
+        std::uint64_t samples_merged = 0;     ///< Of pixels, scouts included.
+        std::vector<std::uint32_t> rounds{};  ///< Of each block's picture.
+        std::vector<BlockNoise> noise{};      ///< Of the last finished pass, as is `mean`.
+        double mean = 0;
     };
 
+    [[nodiscard]] std::uint32_t block_of(std::uint32_t unit) const { return unit % grid_.count(); }
     [[nodiscard]] Round round_of(RoundKey key) const;
+    [[nodiscard]] bool staged() const { return plan_.sampling.staged(); }
+    [[nodiscard]] bool stopped() const { return direct_.ledger.stopped(); }
+    [[nodiscard]] PassGoal goal_of(const Part& part) const;
+    [[nodiscard]] LedgerPlan plan_of(std::uint32_t samples) const;
+    void open_pass(Part& part);
+    void measure(Part& part) const;
+    void finish_passes();
+    [[nodiscard]] double summed_squared_error(const Part& part) const;
     [[nodiscard]] double progress(const Part& part) const;
     [[nodiscard]] bool complete(const Part& part) const {
         return part.samples == 0 || part.ledger.complete();
@@ -98,6 +128,8 @@ class FrameWork {
     BlockGrid grid_;
     Epoch epoch_;
     Part direct_, indirect_;
+    std::uint32_t passes_finished_ = 0;
+    bool last_pass_finished_ = false;
     Schedule schedule_, direct_schedule_;
 };
 

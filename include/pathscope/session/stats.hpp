@@ -6,21 +6,33 @@
 /// Units: seconds for *_s, milliseconds for *_ms, bytes. Thread safety: pure.   Test: tests/session/test_stats.cpp
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pathscope/core/hash.hpp"
 #include "pathscope/image/dropped_sample.hpp"
+#include "pathscope/image/image.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/session/render_state.hpp"
 
 namespace pathscope {
+
+/// Of the picture: what the scouts of adaptive rounds used up is not in it.
+struct SamplesPerPixel {
+    double min = 0, mean = 0, max = 0;
+};
+
+/// Requires: pixels, each with its number of samples.
+[[nodiscard]] SamplesPerPixel summary_of(const Plane& samples);
 
 /// What the store does not know.
 struct RunFigures {
     double wall_s = 0, load_s = 0, build_s = 0, render_s = 0;
     int threads = 0;
     Digest image_hash{};
+    std::optional<double> estimated_error;  ///< Relative; nothing when it was not asked for.
+    SamplesPerPixel samples_per_pixel;      ///< As the layer `spp` has them.
     std::uint64_t saturated = 0;
     std::vector<DroppedSample> dropped;  ///< Some of those counted as nonfinite_dropped.
 };
