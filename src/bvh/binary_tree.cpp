@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 
 #include "bvh/object_split.hpp"
 #include "bvh/spatial_split.hpp"
@@ -18,6 +19,8 @@ constexpr std::size_t k_subtree_references = 4096;
 /// root, or where the triangles would fit into a few blocks anyway.
 constexpr float k_overlap_of_parent = 0.2f, k_overlap_of_root = 1e-5f;
 constexpr std::size_t k_uncut_references = 2 * k_wide;
+/// Of nodes that are not made by halving alone. What is left to the limit of the wide tree is room for references that cuts add.
+constexpr int k_max_binary_depth = k_wide_max_depth - 16;
 
 struct Rules {
     const Mesh& mesh;
@@ -32,32 +35,46 @@ Box intersection(const Box& a, const Box& b) { return {max(a.low, b.low), min(a.
 
 int levels_of_halving(std::size_t count) { return static_cast<int>(std::bit_width(count - 1)); }
 
+/// Whether cutting triangles may gain anything over an object split.
+bool may_cut(const Rules& rules, std::size_t references, const ReferenceBounds& bounds,
+             const std::optional<ObjectSplit>& object, Budget budget) {
+    if (budget <= 0 || references <= k_uncut_references || rules.params.spatial_gain >= 1) return false;
+    if (!object) return true;
+    const float worthwhile =
+        std::max(k_overlap_of_parent * bounds.boxes.half_area(), k_overlap_of_root * rules.root_area);
+    return intersection(object->left, object->right).half_area() > worthwhile;
+}
+
+/// Divides by a plane if that gains enough; returns where the references of the right side begin.
+std::optional<std::size_t> divide_by_plane(const Rules& rules, std::vector<Reference>& references,
+                                           std::size_t begin, const ReferenceBounds& bounds,
+                                           const std::optional<ObjectSplit>& object, Budget& budget) {
+    const std::span<const Reference> all = std::span(references).subspan(begin);
+    const auto split = find_spatial_split(rules.mesh, all, bounds.boxes.box());
+    if (!split || Budget(split->left + split->right - all.size()) > budget) return std::nullopt;
+    if (object && split->cost >= (1 - rules.params.spatial_gain) * object->cost) return std::nullopt;
+
+    const std::size_t before = references.size();
+    const std::size_t middle = divide_at(*split, rules.mesh, references, begin);
+    budget -= Budget(references.size() - before);
+    if (middle > begin && middle < references.size()) return middle;
+    // The bins were off by a rounding, and one side is empty.
+    const std::span<Reference> cut = std::span(references).subspan(begin);
+    return begin + partition_at_median(cut, bounds_of(cut));
+}
+
 /// Divides the references from `begin` on in two; returns where those of the right begin.
 std::size_t divide(const Rules& rules, std::vector<Reference>& references, std::size_t begin,
                    const ReferenceBounds& bounds, int depth, Budget& budget) {
     const std::span<Reference> all = std::span(references).subspan(begin);
     // An uneven split may leave all but one reference on one side; near the depth limit only halving is left.
-    if (depth + 1 + levels_of_halving(all.size() - 1) > k_wide_max_depth / 2 + 16)
+    if (depth + 1 + levels_of_halving(all.size() - 1) > k_max_binary_depth)
         return begin + partition_at_median(all, bounds);
 
     const auto object = find_object_split(all, bounds, rules.params.bins);
-    const float worthwhile =
-        std::max(k_overlap_of_parent * bounds.boxes.half_area(), k_overlap_of_root * rules.root_area);
-    const bool overlaps = !object || intersection(object->left, object->right).half_area() > worthwhile;
-    if (overlaps && budget > 0 && all.size() > k_uncut_references && rules.params.spatial_gain < 1) {
-        const auto spatial = find_spatial_split(rules.mesh, all, bounds.boxes.box());
-        const bool gains =
-            spatial && (!object || spatial->cost < (1 - rules.params.spatial_gain) * object->cost);
-        const auto added = spatial ? Budget(spatial->left + spatial->right - all.size()) : 0;
-        if (gains && added <= budget) {
-            const std::size_t before = references.size();
-            const std::size_t middle = divide_at(*spatial, rules.mesh, references, begin);
-            budget -= Budget(references.size() - before);
-            if (middle > begin && middle < references.size()) return middle;
-            const std::span<Reference> cut = std::span(references).subspan(begin);
-            return begin + partition_at_median(cut, bounds_of(cut));
-        }
-    }
+    if (may_cut(rules, all.size(), bounds, object, budget))
+        if (const auto middle = divide_by_plane(rules, references, begin, bounds, object, budget))
+            return *middle;
     return begin + (object ? partition_at(*object, all, bounds) : partition_at_median(all, bounds));
 }
 
