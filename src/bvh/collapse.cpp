@@ -107,7 +107,7 @@ class Collapser {
     [[nodiscard]] Children children_of(std::uint32_t number) const {
         Children children;
         const BinaryNode& node = tree_.nodes[number];
-        if (plans_[number].to_left[0] == k_as_leaf) {  // The whole tree is one block.
+        if (is_block(number)) {  // The whole tree is one block.
             children.roots[children.count++] = number;
         } else {
             const std::size_t to_left = plans_[number].inner_to_left;
@@ -122,32 +122,37 @@ class Collapser {
         return children;
     }
 
+    /// Writes the node that stands for `number`, and all below it.
     void fill(std::uint32_t place, std::uint32_t number, int depth) {
         CHECK(depth < k_wide_max_depth, depth);  // The traversal's stack relies on it.
         const Children children = children_of(number);
-        std::array<std::uint32_t, k_wide> inner_place{};
         WideNode node;
-        for (auto& plane : node.bounds) plane.fill(0);
-        for (std::size_t i = 0; i < k_wide; ++i) {
-            const bool used = i < children.count;
-            const Box box = used ? tree_.nodes[children.roots[i]].box : Box{};
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                node.bounds[axis][i] = box.low[int(axis)];
-                node.bounds[axis + 3][i] = box.high[int(axis)];
-            }
+        // Of a place without a child: an empty box, and block 0, which is harmless to rays that are not numbers.
+        for (std::size_t i = 0; i < k_wide; ++i) set_bounds(node, i, Box{});
+        node.children.fill(k_leaf_child);
+        for (std::size_t i = 0; i < children.count; ++i) {
+            const BinaryNode& child = tree_.nodes[children.roots[i]];
+            set_bounds(node, i, child.box);
             node.children[i] =
-                k_leaf_child;  // Of a place without a child: harmless to rays that are not numbers.
-            if (!used) continue;
-            if (plans_[children.roots[i]].to_left[0] == k_as_leaf) {
-                node.children[i] = append_block(tree_.nodes[children.roots[i]]) | k_leaf_child;
-            } else {
-                node.children[i] = inner_place[i] = static_cast<std::uint32_t>(bvh_.nodes.size());
-                bvh_.nodes.emplace_back();
-            }
+                is_block(children.roots[i]) ? append_block(child) | k_leaf_child : append_node();
         }
         bvh_.nodes[place] = node;
         for (std::size_t i = 0; i < children.count; ++i)
-            if (inner_place[i] != 0) fill(inner_place[i], children.roots[i], depth + 1);
+            if (!is_block(children.roots[i])) fill(node.children[i], children.roots[i], depth + 1);
+    }
+
+    [[nodiscard]] bool is_block(std::uint32_t number) const { return plans_[number].to_left[0] == k_as_leaf; }
+
+    static void set_bounds(WideNode& node, std::size_t place, const Box& box) {
+        for (int axis = 0; axis < 3; ++axis) {
+            node.bounds[std::size_t(axis)][place] = box.low[axis];
+            node.bounds[std::size_t(axis) + 3][place] = box.high[axis];
+        }
+    }
+
+    std::uint32_t append_node() {
+        bvh_.nodes.emplace_back();
+        return static_cast<std::uint32_t>(bvh_.nodes.size() - 1);
     }
 
     std::uint32_t append_block(const BinaryNode& node) {
