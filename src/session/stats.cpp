@@ -45,8 +45,20 @@ SamplesPerPixel summary_of(const Plane& samples) {
     return {double(*least), sum / double(samples.pixels.size()), double(*most)};
 }
 
+SceneMemory memory_of(const Scene& scene) {
+    const auto bytes = [](const auto& table) { return table.size() * sizeof(table[0]); };
+    const Mesh& mesh = scene.mesh;
+    return {mesh.triangle_count(),
+            bytes(mesh.positions) + bytes(mesh.normals) + bytes(mesh.uvs) + bytes(mesh.triangles) +
+                bytes(mesh.materials),
+            tree_bytes(scene.tree)};
+}
+
 std::string stats_json(const RenderState& state, const EventStore& store, const RunFigures& figures) {
     const CounterTotals totals = store.totals();
+    const auto per_triangle = [&](std::size_t bytes) {
+        return double(bytes) / std::max<double>(1, figures.memory.triangles);
+    };
     const auto total = [&](Counter counter) { return totals[std::size_t(counter)]; };
     const auto local = store.server(k_local_server);
 
@@ -63,6 +75,9 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"load_s", figures.load_s},
               {"build_s", figures.build_s},
               {"render_s", figures.render_s},
+              {"triangles", figures.memory.triangles},
+              {"mesh_bytes_per_triangle", per_triangle(figures.memory.mesh_bytes)},
+              {"bvh_bytes_per_triangle", per_triangle(figures.memory.tree_bytes)},
               {"rays", total(Counter::rays)},
               {"rays_per_s", per_second(total(Counter::rays), figures.render_s)},
               {"samples", total(Counter::samples)},

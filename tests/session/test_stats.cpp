@@ -34,6 +34,9 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
                             "load_s",
                             "build_s",
                             "render_s",
+                            "triangles",
+                            "mesh_bytes_per_triangle",
+                            "bvh_bytes_per_triangle",
                             "rays",
                             "rays_per_s",
                             "samples",
@@ -76,6 +79,7 @@ TEST_CASE("the numbers are those of the store, each counter under its own key") 
     figures.build_s = 2.5;
     figures.render_s = 4;
     figures.threads = 3;
+    figures.memory = {10, 450, 720};
     figures.image_hash = hash_text("image");
     figures.saturated = 5;
     figures.estimated_error = 0.125;
@@ -95,6 +99,9 @@ TEST_CASE("the numbers are those of the store, each counter under its own key") 
     CHECK(json["build_s"] == 2.5);
     CHECK(json["render_s"] == 4);
     CHECK(json["threads"] == 3);
+    CHECK(json["triangles"] == 10);
+    CHECK(json["mesh_bytes_per_triangle"] == 45);
+    CHECK(json["bvh_bytes_per_triangle"] == 72);
     CHECK(json["rays_per_s"] == double(store.total(Counter::rays)) / 4);
     CHECK(json["samples_per_s"] == double(store.total(Counter::samples)) / 4);
     CHECK(json["image_hash"] == to_hex(figures.image_hash));

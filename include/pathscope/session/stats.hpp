@@ -14,6 +14,7 @@
 #include "pathscope/image/dropped_sample.hpp"
 #include "pathscope/image/image.hpp"
 #include "pathscope/probe/event_store.hpp"
+#include "pathscope/scene/scene.hpp"
 #include "pathscope/session/render_state.hpp"
 
 namespace pathscope {
@@ -26,10 +27,18 @@ struct SamplesPerPixel {
 /// Requires: pixels, each with its number of samples.
 [[nodiscard]] SamplesPerPixel summary_of(const Plane& samples);
 
+/// What the geometry of a scene takes in memory. Textures and lights are not counted.
+struct SceneMemory {
+    std::uint32_t triangles = 0;
+    std::size_t mesh_bytes = 0, tree_bytes = 0;
+};
+[[nodiscard]] SceneMemory memory_of(const Scene& scene);
+
 /// What the store does not know.
 struct RunFigures {
     double wall_s = 0, load_s = 0, build_s = 0, render_s = 0;
     int threads = 0;
+    SceneMemory memory;
     Digest image_hash{};
     std::optional<double> estimated_error;  ///< Relative; nothing when it was not asked for.
     SamplesPerPixel samples_per_pixel;      ///< As the layer `spp` has them.
