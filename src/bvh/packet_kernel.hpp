@@ -141,12 +141,9 @@ template <class Plane>
     return true;
 }
 
-/// As intersect_triangles() for one triangle and the eight rays from `first` on. Returns the rays that hit it.
+/// One triangle and the eight rays from `first` on.
 [[nodiscard]] inline Lanes intersect_rays(const TriangleBlock& block, std::size_t lane,
                                           const PacketRays& rays, std::size_t first, BlockHits& hits) {
-    struct Sheared {
-        Double8 x, y, z;
-    };
     const auto row = [&](const PacketRays::Row& numbers) { return load(numbers.data() + first); };
     const Double8 shear_x = row(rays.shear_x), shear_y = row(rays.shear_y);
     const auto shear = [&](std::size_t corner) {
@@ -155,28 +152,11 @@ template <class Plane>
                    row(origin);
         };
         const Double8 z = from_origin(rays.z, rays.origin_z);
-        return Sheared{from_origin(rays.x, rays.origin_x) - shear_x * z,
-                       from_origin(rays.y, rays.origin_y) - shear_y * z, z};
+        return ShearedCorners{from_origin(rays.x, rays.origin_x) - shear_x * z,
+                              from_origin(rays.y, rays.origin_y) - shear_y * z, z};
     };
-    const Sheared a = shear(0), b = shear(1), c = shear(2);
-
-    const Double8 u = difference_of_products(c.x, b.y, c.y, b.x);
-    const Double8 v = difference_of_products(a.x, c.y, a.y, c.x);
-    const Double8 w = difference_of_products(b.x, a.y, b.y, a.x);
-    const Double8 zero = broadcast(0.0);
-    const Lanes inside = at_most(zero, min(u, min(v, w))) | at_most(max(u, max(v, w)), zero);
-    if (!any(inside)) return 0;
-
-    const Double8 sum = u + v + w;
-    const Double8 inverse_sum = broadcast(1.0) / sum;
-    const Float8 t = narrow((u * a.z + v * b.z + w * c.z) * inverse_sum * row(rays.inverse_z));
-    const Lanes hit = inside & ~equal(sum, zero) & at_most(load(rays.t_min.data() + first), t) &
-                      at_most(t, load(rays.t_max.data() + first));
-    if (!any(hit)) return 0;
-    store(hits.t.data(), t);
-    store(hits.u.data(), narrow(v * inverse_sum));
-    store(hits.v.data(), narrow(w * inverse_sum));
-    return hit;
+    return intersect_sheared(shear(0), shear(1), shear(2), row(rays.inverse_z),
+                             load(rays.t_min.data() + first), load(rays.t_max.data() + first), hits);
 }
 
 /// Calls found(ray, triangle, hit) for each of these triangles of the block and each ray of the packet that meets it.

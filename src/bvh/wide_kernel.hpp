@@ -58,28 +58,20 @@ struct WideBoxRay {
     return select(cancel, fused_multiply_subtract(a, b, ab) - fused_multiply_subtract(c, d, cd), ab - cd);
 }
 
+/// Corners as seen along the ray: sheared x and y, and the distance along z.
+struct ShearedCorners {
+    Double8 x, y, z;
+};
+
 struct BlockHits {
     alignas(32) std::array<float, k_wide> t, u, v;
 };
 
-/// As intersect_proper_triangle(), step by step and bit by bit, for the eight triangles of a block. Returns those that are
-/// hit; `hits` is written in those lanes only.
-[[nodiscard]] inline Lanes intersect_triangles(const TriangleBlock& block, const TriangleRay& ray,
-                                               float t_max, BlockHits& hits) {
-    struct Sheared {
-        Double8 x, y, z;
-    };
-    const auto shear = [&](std::size_t corner) {
-        const auto& axes = block.corners[corner];
-        const auto from_origin = [&](int axis, double origin) {
-            return widen(load(axes[static_cast<std::size_t>(axis)].data())) - broadcast(origin);
-        };
-        const Double8 z = from_origin(ray.z, ray.origin_z);
-        return Sheared{from_origin(ray.x, ray.origin_x) - broadcast(ray.shear_x) * z,
-                       from_origin(ray.y, ray.origin_y) - broadcast(ray.shear_y) * z, z};
-    };
-    const Sheared a = shear(0), b = shear(1), c = shear(2);
-
+/// As intersect_proper_triangle(), step by step and bit by bit, for eight pairs of a ray and a triangle. Returns those that
+/// meet; `hits` is written if there are any, and means something in those lanes only.
+[[nodiscard]] inline Lanes intersect_sheared(const ShearedCorners& a, const ShearedCorners& b,
+                                             const ShearedCorners& c, Double8 inverse_z, Float8 t_min,
+                                             Float8 t_max, BlockHits& hits) {
     const Double8 u = difference_of_products(c.x, b.y, c.y, b.x);
     const Double8 v = difference_of_products(a.x, c.y, a.y, c.x);
     const Double8 w = difference_of_products(b.x, a.y, b.y, a.x);
@@ -89,14 +81,29 @@ struct BlockHits {
 
     const Double8 sum = u + v + w;
     const Double8 inverse_sum = broadcast(1.0) / sum;  // Infinite where the triangle is seen edge-on.
-    const Float8 t = narrow((u * a.z + v * b.z + w * c.z) * inverse_sum * broadcast(ray.inverse_z));
-    const Lanes hit =
-        inside & ~equal(sum, zero) & at_most(broadcast(ray.t_min), t) & at_most(t, broadcast(t_max));
+    const Float8 t = narrow((u * a.z + v * b.z + w * c.z) * inverse_sum * inverse_z);
+    const Lanes hit = inside & ~equal(sum, zero) & at_most(t_min, t) & at_most(t, t_max);
     if (!any(hit)) return 0;
     store(hits.t.data(), t);
     store(hits.u.data(), narrow(v * inverse_sum));
     store(hits.v.data(), narrow(w * inverse_sum));
     return hit;
+}
+
+/// The eight triangles of a block and one ray.
+[[nodiscard]] inline Lanes intersect_triangles(const TriangleBlock& block, const TriangleRay& ray,
+                                               float t_max, BlockHits& hits) {
+    const auto shear = [&](std::size_t corner) {
+        const auto& axes = block.corners[corner];
+        const auto from_origin = [&](int axis, double origin) {
+            return widen(load(axes[static_cast<std::size_t>(axis)].data())) - broadcast(origin);
+        };
+        const Double8 z = from_origin(ray.z, ray.origin_z);
+        return ShearedCorners{from_origin(ray.x, ray.origin_x) - broadcast(ray.shear_x) * z,
+                              from_origin(ray.y, ray.origin_y) - broadcast(ray.shear_y) * z, z};
+    };
+    return intersect_sheared(shear(0), shear(1), shear(2), broadcast(ray.inverse_z), broadcast(ray.t_min),
+                             broadcast(t_max), hits);
 }
 
 /// Calls found(triangle, hit) for each triangle of the block that the ray meets, until it returns true.
