@@ -1,5 +1,6 @@
 #include "pathscope/math/simd.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -30,17 +31,24 @@ TEST_CASE("lanes are walked from the lowest") {
 TEST_CASE("arithmetic is that of single floats and doubles, lane by lane") {
     HashRng rng(3);
     for (int round = 0; round < 1000; ++round) {
-        alignas(32) std::array<float, 8> a, b, sum, product, narrowed;
+        alignas(32) std::array<float, 8> a, b, sum, product, ratio, narrowed;
+        alignas(64) std::array<double, 8> stored;
         for (std::size_t i = 0; i < 8; ++i) a[i] = rng.next_float() - 0.5f, b[i] = rng.next_float() - 0.5f;
         const Float8 x = load(a.data()), y = load(b.data());
         store(sum.data(), x + y);
         store(product.data(), x * y - y);
+        store(ratio.data(), x / y);
+        store(stored.data(), widen(x));
+        CHECK(least(x) == *std::min_element(a.begin(), a.end()));
+        CHECK(greatest(x) == *std::max_element(a.begin(), a.end()));
         const Double8 quotient = widen(x) / (widen(y) - broadcast(2.0));
         store(narrowed.data(), narrow(select(0b00001111, quotient, widen(y))));
         const Lanes at_most_lanes = at_most(x, y);
         for (std::size_t i = 0; i < 8; ++i) {
             CHECK(sum[i] == a[i] + b[i]);
             CHECK(product[i] == a[i] * b[i] - b[i]);
+            CHECK(ratio[i] == a[i] / b[i]);
+            CHECK(stored[i] == double(a[i]));
             CHECK(narrowed[i] == (i < 4 ? float(double(a[i]) / (double(b[i]) - 2)) : b[i]));
             CHECK((at_most_lanes >> i & 1) == (a[i] <= b[i]));
         }

@@ -20,6 +20,7 @@
 /// round as scalar ones do, lane by lane: the bits are the same at every level.
 /// Thread safety: pure.   Test: tests/math/test_simd.cpp
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -73,8 +74,20 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 [[nodiscard]] inline Float8 operator+(Float8 a, Float8 b) { return {_mm256_add_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 operator-(Float8 a, Float8 b) { return {_mm256_sub_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 operator*(Float8 a, Float8 b) { return {_mm256_mul_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float8 operator/(Float8 a, Float8 b) { return {_mm256_div_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 min(Float8 a, Float8 b) { return {_mm256_min_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) { return {_mm256_max_ps(a.lanes, b.lanes)}; }
+/// The smallest of the eight.
+[[nodiscard]] inline float least(Float8 a) {
+    __m128 m = _mm_min_ps(_mm256_castps256_ps128(a.lanes), _mm256_extractf128_ps(a.lanes, 1));
+    m = _mm_min_ps(m, _mm_movehl_ps(m, m));
+    return _mm_cvtss_f32(_mm_min_ss(m, _mm_movehdup_ps(m)));
+}
+[[nodiscard]] inline float greatest(Float8 a) {
+    __m128 m = _mm_max_ps(_mm256_castps256_ps128(a.lanes), _mm256_extractf128_ps(a.lanes, 1));
+    m = _mm_max_ps(m, _mm_movehl_ps(m, m));
+    return _mm_cvtss_f32(_mm_max_ss(m, _mm_movehdup_ps(m)));
+}
 /// The lanes where a <= b.
 [[nodiscard]] inline Lanes at_most(Float8 a, Float8 b) {
 #if PATHSCOPE_SIMD_AT_LEAST(avx512)
@@ -93,6 +106,7 @@ struct Double8 {
 };
 /// Requires: aligned to 64 bytes.
 [[nodiscard]] inline Double8 load(const double* eight) { return {_mm512_load_pd(eight)}; }
+inline void store(double* eight, Double8 a) { _mm512_store_pd(eight, a.lanes); }
 [[nodiscard]] inline Double8 widen(Float8 a) { return {_mm512_cvtps_pd(a.lanes)}; }
 [[nodiscard]] inline Float8 narrow(Double8 a) { return {_mm512_cvtpd_ps(a.lanes)}; }
 [[nodiscard]] inline Double8 broadcast(double a) { return {_mm512_set1_pd(a)}; }
@@ -124,6 +138,10 @@ struct Double8 {
 };
 [[nodiscard]] inline Double8 load(const double* eight) {
     return {_mm256_load_pd(eight), _mm256_load_pd(eight + 4)};
+}
+inline void store(double* eight, Double8 a) {
+    _mm256_store_pd(eight, a.low);
+    _mm256_store_pd(eight + 4, a.high);
 }
 [[nodiscard]] inline Double8 widen(Float8 a) {
     return {_mm256_cvtps_pd(_mm256_castps256_ps128(a.lanes)),
@@ -209,12 +227,17 @@ inline void store(float* eight, Float8 a) {
 [[nodiscard]] inline Float8 operator*(Float8 a, Float8 b) {
     return lanewise::each(a, b, [](float x, float y) { return x * y; });
 }
+[[nodiscard]] inline Float8 operator/(Float8 a, Float8 b) {
+    return lanewise::each(a, b, [](float x, float y) { return x / y; });
+}
 [[nodiscard]] inline Float8 min(Float8 a, Float8 b) {
     return lanewise::each(a, b, [](float x, float y) { return x < y ? x : y; });
 }
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) {
     return lanewise::each(a, b, [](float x, float y) { return x > y ? x : y; });
 }
+[[nodiscard]] inline float least(Float8 a) { return *std::min_element(a.lanes.begin(), a.lanes.end()); }
+[[nodiscard]] inline float greatest(Float8 a) { return *std::max_element(a.lanes.begin(), a.lanes.end()); }
 [[nodiscard]] inline Lanes at_most(Float8 a, Float8 b) {
     Lanes lanes = 0;
     for (std::size_t i = 0; i < 8; ++i) lanes |= Lanes{a.lanes[i] <= b.lanes[i]} << i;
@@ -244,6 +267,9 @@ template <class Test>
     Double8 result;
     for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = eight[i];
     return result;
+}
+inline void store(double* eight, Double8 a) {
+    for (std::size_t i = 0; i < 8; ++i) eight[i] = a.lanes[i];
 }
 [[nodiscard]] inline Double8 widen(Float8 a) {
     Double8 result;
