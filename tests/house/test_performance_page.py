@@ -147,6 +147,19 @@ def words(picture):
     return [text.text for text in parse(picture).iter(SVG + "text")]
 
 
+def dashed_lines(picture):
+    """Of each dashed line: its first and last point."""
+    paths = [path.get("d") for path in parse(picture).iter(SVG + "path") if path.get("stroke-dasharray")]
+    points = [[tuple(map(float, point.split(","))) for point in path[1:].split("L")] for path in paths]
+    return [(line[0], line[-1]) for line in points]
+
+
+def above(line, point):
+    """By how many pixels a line passes above a point."""
+    (x0, y0), (x1, y1) = line
+    return point[1] - (y0 + (y1 - y0) * (point[0] - x0) / (x1 - x0))
+
+
 class Pictures(unittest.TestCase):
     SCENES = {"box & <ball>": {"textbook": monte_carlo(1), "best": monte_carlo(0.5)},
               "dim": {"textbook": monte_carlo(1e-3), "best": monte_carlo(1e-4)}}
@@ -168,6 +181,20 @@ class Pictures(unittest.TestCase):
                  for level in (1, 1e-3)]
         self.assertGreater(falls[0], 20)
         self.assertAlmostEqual(falls[0], falls[1], delta=0.11)
+
+    def test_points_stand_at_the_ticks_of_their_values(self):
+        picture = image_figures.pictures(image_file({"box": {"textbook": monte_carlo(1)}})["rows"])[0]
+        ticks = {text.text: (float(text.get("x")), float(text.get("y"))) for text in parse(picture).iter(SVG + "text")}
+        x, y = markers(picture)["textbook: 4 samples per pixel, RMSE 0.5"]
+        self.assertEqual(ticks["4"][0], x)
+        self.assertAlmostEqual(ticks["0.5"][1], y + 4, delta=0.11)  # A base line is below the middle of its digits.
+
+    def test_the_guide_runs_along_plain_noise(self):
+        picture = image_figures.pictures(image_file({"box": {"textbook": monte_carlo(1)}})["rows"])[0]
+        guide, = dashed_lines(picture)
+        heights = [above(guide, place) for place in markers(picture).values()]
+        self.assertGreater(min(heights), 10)
+        self.assertLess(max(heights) - min(heights), 0.3)
 
     def test_any_number_of_scenes_and_of_points(self):
         for count in (1, 2, 3, 5, 8):
@@ -192,9 +219,14 @@ class Pictures(unittest.TestCase):
         line = [path.get("d") for path in parse(ratios).iter(SVG + "path") if path.get("stroke") == plot.INK]
         self.assertEqual([float(re.match(r"M([\d.]+),", path).group(1)) for path in line], at_one)
         self.assertIn("wide 0.89 times (0.80 to 1.00)", ratios.alt)
-        # 100 ns at 5 nodes and 200 ns at 10: the same time per node, so both stand on one line of slope 1.
-        self.assertIn("wide, primary: 5.0 nodes, 100 ns", markers(steps))
-        self.assertIn("wide, shadow: 10.0 nodes, 200 ns", markers(steps))
+        # 100 ns at 5 nodes and 200 ns at 10: both stand on the lowest ruler, that of 20 ns per node.
+        places = [markers(steps)[hint] for hint in ("wide, primary: 5.0 nodes, 100 ns", "wide, shadow: 10.0 nodes, 200 ns")]
+        _, *rulers = dashed_lines(steps)  # The first belongs to the key.
+        self.assertEqual(len(rulers), 3)
+        for place in places:
+            heights = sorted(above(ruler, place) for ruler in rulers)
+            self.assertAlmostEqual(heights[0], 0, delta=0.3)
+            self.assertGreater(heights[1], 5)
         self.assertIn("wide 20 to 20, median 20", steps.alt)
 
     def test_without_the_peer_there_is_no_ratio(self):

@@ -2,7 +2,7 @@
 import math
 from statistics import median
 
-from performance.plot import INK, LOOKS, SOFT, WIDTH, Canvas, Look, Panel, Picture, axis_around, decades, lay_out_panels, looks_of
+from performance.plot import INK, LOOKS, SOFT, WIDTH, Canvas, Look, Panel, Picture, axis_around, decades, lay_out_panels, looks_of, spread
 
 # What a step into a node or leaf usually takes a single ray on a server core with 2 MiB of second-level cache, by where the tree
 # lives: below 2 MiB, in the third level, or beyond 100 MiB. Rulers to read the points by, not limits that no code could beat.
@@ -10,6 +10,7 @@ RULERS_NS = [(20, "L2"), (30, "L3"), (40, "DRAM")]
 
 ROW_HEIGHT, SCENE_GAP, NAME_WIDTH = 17, 28, 150
 TREE_OFFSET = 5  # between the trees of one line, so that equal ones do not hide each other
+NAME_GAP = 70    # between the names of trees, from middle to middle
 KEY_HEIGHT = 56
 KIND_MARKERS = {"primary": "circle", "diffuse": "square", "incoherent": "triangle", "shadow": "diamond", "shadow3": "wedge"}
 
@@ -71,8 +72,9 @@ def draw_ratios(rows, looks, peer, description):
     for row in rows:
         draw_ratio(panel, places.places[row["scene"], row["rays"]] + aside[row["ours"]], row, looks[row["ours"]])
     first = [row for row in rows if (row["scene"], row["rays"]) == (rows[0]["scene"], rows[0]["rays"])]
-    for row in first:  # The name of each tree once, above its topmost point.
-        canvas.text(panel.x(row["ratio_vs_embree"]), places.headings[0][1] + 4, row["ours"], looks[row["ours"]].colour, 12, "middle", True)
+    for row, x in zip(first, spread([panel.x(row["ratio_vs_embree"]) for row in first], NAME_GAP)):
+        # The name of each tree once, above its topmost point.
+        canvas.text(x, places.headings[0][1] + 4, row["ours"], looks[row["ours"]].colour, 12, "middle", True)
     return canvas.svg(description)
 
 
