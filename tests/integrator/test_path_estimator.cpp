@@ -108,6 +108,30 @@ TEST_CASE("direct + indirect is what a plain recursive path tracer finds, in bot
     CHECK(same_mean(best, textbook));
 }
 
+TEST_CASE("a lamp behind a veil is seen through it, with every way of weighing") {
+    SceneParts parts = empty_parts();
+    Material veil = lambert({0.8f, 0.8f, 0.8f});
+    veil.opacity = 0.4f;
+    add_rectangle(parts, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, add_material(parts, veil));
+    add_rectangle(parts, {-1, -1, -0.5f}, {2, 0, 0}, {0, 2, 0}, add_material(parts, lambert({}, {1, 1, 1})));
+    const Scene scene = small_scene(std::move(parts), {EmissiveMtlSpec{}});
+    const Ray ray{{0, 0, 1}, {0, 0, -1}};
+    for (const MisHeuristic mis : {MisHeuristic::off, MisHeuristic::balance, MisHeuristic::power}) {
+        CAPTURE(name_of(mis));
+        TransportSettings settings = make_settings(Setting::best);
+        settings.sampler = SamplerKind::independent;
+        settings.mis = mis;
+        Moments seen;
+        for (int i = 0; i < 4000; ++i) {
+            const PixelSampler sampler(settings.sampler, 3, i, 0, 0);
+            std::uint64_t rays = 0;
+            seen.add(estimate_radiance<LightPart::direct>(scene, settings, ray, sampler, rays).x);
+        }
+        // The veil is lit from behind, so it is black itself: what comes is what passes it.
+        CHECK(std::abs(seen.mean() - 0.6) < 4 * seen.standard_error());
+    }
+}
+
 TEST_CASE("every lever alone leaves the image as it is") {
     const Scene scene = small_room();
     const int size = 4, samples = k_sanitized ? 500 : 10'000;

@@ -59,12 +59,17 @@ namespace pathscope {
     return sum;
 }
 
+/// Whether emitters count that a ray from this origin runs into.
+[[nodiscard]] inline bool sees_emitters(const TransportSettings& settings, const PathOrigin& origin) {
+    return origin.delta || uses_both_techniques(settings.mis);
+}
+
 /// What the ray runs into sends back along it, with the MIS weight of having found it this way.
 [[nodiscard]] inline Rgb emission_towards(const Scene& scene, const TransportSettings& settings,
                                           const PathOrigin& origin, const Ray& ray,
                                           const std::optional<SceneHit>& hit) {
     if (hit && hit->light == k_no_light) return {};
-    if (!origin.delta && !uses_both_techniques(settings.mis)) return {};
+    if (!sees_emitters(settings, origin)) return {};
 
     const Rgb emitted =
         hit ? emitted_radiance(scene, *hit, -ray.direction) : environment_radiance(scene, ray.direction);

@@ -90,11 +90,12 @@ template <LightPart part, class Probe = NullPathProbe>
         const bool is_first_diffuse = !vertex.specular && diffuse_vertices == 1;
         if (!vertex.specular && is_first_diffuse == (part == LightPart::direct))
             add(bounce + 1, throughput * sample_direct_light(scene, settings, vertex, random, rays));
-        if (part == LightPart::direct && is_first_diffuse && !uses_both_techniques(settings.mis)) break;
 
-        // The next direction, and whether it is worth a ray. The direct part ends with that ray, so it plays no roulette.
+        // The next direction, and whether it is worth a ray. The direct part ends with that ray, so it plays no roulette,
+        // and does without it where the light sample counts alone.
         const std::optional<NextDirection> next = sample_next_direction(settings, vertex, random);
         if (!next) break;
+        if (part == LightPart::direct && is_first_diffuse && !sees_emitters(settings, next->origin)) break;
         throughput *= next->weight;
         if (is_zero(throughput)) break;
         if (!is_finite(throughput))
