@@ -7,20 +7,11 @@
 namespace pathscope {
 namespace {
 
-void render_part(const Scene& scene, const Camera& camera, const RenderSettings& settings, LightPart part,
-                 int threads, FrameSums& sums, LocalRender& total) {
-    const std::uint32_t spp = part == LightPart::direct ? settings.direct_spp : settings.spp;
-    if (spp == 0) return;
-    for (std::uint32_t block = 0; block < sums.grid().count(); ++block) {
-        const Round round = sums.grid().round(block, 0, spp);
-        RoundResult result = *render_round(scene, camera, settings, part, round, threads);
-        if (part == LightPart::indirect && settings.filter == FilterPlace::server)
-            result.sums = filter_tile(scene, camera, settings, round, result.sums, threads);
-        sums.add(round, result.sums);
-        total.rays += result.rays;
-        total.samples += result.samples;
-        total.dropped += result.dropped_count;
-    }
+void add(FrameSums& sums, const Round& round, const RoundResult& result, LocalRender& total) {
+    sums.add(round, result.sums);
+    total.rays += result.rays;
+    total.samples += result.samples;
+    total.dropped += result.dropped_count;
 }
 
 }  // namespace
@@ -43,8 +34,29 @@ LocalRender render_locally(const Scene& scene, const Camera& camera, const Rende
                            int block_size, int threads) {
     const BlockGrid grid(settings.width, settings.height, block_size);
     LocalRender total{FrameSums(grid, settings.quantum), FrameSums(grid, settings.quantum)};
-    render_part(scene, camera, settings, LightPart::direct, threads, total.direct, total);
-    render_part(scene, camera, settings, LightPart::indirect, threads, total.indirect, total);
+    const auto finish_indirect = [&](const Round& round, RoundResult& result) {
+        if (settings.filter == FilterPlace::server)
+            result.sums = filter_tile(scene, camera, settings, round, result.sums, threads);
+        add(total.indirect, round, result, total);
+    };
+    for (std::uint32_t block = 0; block < grid.count(); ++block) {
+        const Round direct = grid.round(block, 0, settings.direct_spp),
+                    indirect = grid.round(block, 0, settings.spp);
+        if (settings.direct_spp == settings.spp && settings.spp > 0) {
+            PartsResult both = *render_both_parts(scene, camera, settings, indirect, threads);
+            add(total.direct, direct, both.direct, total);
+            finish_indirect(indirect, both.indirect);
+            continue;
+        }
+        if (settings.direct_spp > 0)
+            add(total.direct, direct,
+                *render_round(scene, camera, settings, LightPart::direct, direct, threads), total);
+        if (settings.spp > 0) {
+            RoundResult result =
+                *render_round(scene, camera, settings, LightPart::indirect, indirect, threads);
+            finish_indirect(indirect, result);
+        }
+    }
     return total;
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pathscope/core/parallel_for.hpp"
+#include "pathscope/integrator/both_parts.hpp"
 
 namespace pathscope {
 namespace {
@@ -48,23 +49,46 @@ class CameraPacket {
     std::vector<Ray> rays_;
 };
 
-template <LightPart part>
-RowResult render_row(const Scene& scene, const CameraFrame& camera, const RenderSettings& settings,
-                     const Round& round, int y, PixelSum* sums) {
-    RowResult row;
-    const auto finish = [&](const CameraPacket::Sample& sample, const TracedRay& first) {
-        ++row.rays;
-        const Rgb radiance =
-            estimate_radiance<part>(scene, settings.transport, first, sample.sampler, row.rays);
+/// What a row is rendered from.
+struct RowTask {
+    const Scene& scene;
+    const CameraFrame& camera;
+    const RenderSettings& settings;
+    const Round& round;
+    int y;
+};
+
+/// The sums and the account of one part of a row.
+class RowSums {
+  public:
+    RowSums(const RowTask& task, RoundResult& result) : task_(task) {
+        const std::size_t row = std::size_t(task.y - task.round.rect.y);
+        sums_ = &result.sums[row * std::size_t(task.round.rect.width)];
+    }
+
+    void add(const CameraPacket::Sample& sample, Rgb radiance) {
         if (!is_radiance(radiance)) {
-            row.dropped.push_back({std::uint32_t(sample.x), std::uint32_t(y), sample.number});
+            row_.dropped.push_back({std::uint32_t(sample.x), std::uint32_t(task_.y), sample.number});
             return;
         }
         bool saturated = false;
-        sums[sample.x - round.rect.x] += quantise(radiance, settings.quantum, saturated);
-        row.saturated += saturated;
-    };
+        sums_[sample.x - task_.round.rect.x] += quantise(radiance, task_.settings.quantum, saturated);
+        row_.saturated += saturated;
+    }
 
+    [[nodiscard]] std::uint64_t& rays() { return row_.rays; }
+    [[nodiscard]] RowResult take() { return std::move(row_); }
+
+  private:
+    const RowTask& task_;
+    PixelSum* sums_;
+    RowResult row_;
+};
+
+/// Calls finish(sample, its camera ray and hit) for each sample of the row.
+template <class Finish>
+void each_sample(const RowTask& task, Finish finish) {
+    const auto& [scene, camera, settings, round, y] = task;
     CameraPacket packet;
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t sample = round.first; sample < round.first + round.count; ++sample) {
@@ -73,7 +97,33 @@ RowResult render_row(const Scene& scene, const CameraFrame& camera, const Render
             if (packet.full()) packet.trace(scene, finish);
         }
     packet.trace(scene, finish);
-    return row;
+}
+
+template <LightPart part>
+RowResult render_row(const RowTask& task, RoundResult& result) {
+    RowSums sums(task, result);
+    each_sample(task, [&](const CameraPacket::Sample& sample, const TracedRay& first) {
+        ++sums.rays();
+        sums.add(sample, estimate_radiance<part>(task.scene, task.settings.transport, first, sample.sampler,
+                                                 sums.rays()));
+    });
+    return sums.take();
+}
+
+struct PartsRow {
+    RowResult direct, indirect;
+};
+
+PartsRow render_parts_row(const RowTask& task, PartsResult& result) {
+    RowSums direct(task, result.direct), indirect(task, result.indirect);
+    each_sample(task, [&](const CameraPacket::Sample& sample, const TracedRay& first) {
+        ++indirect.rays();
+        const PartsRadiance radiance =
+            estimate_both_parts(task.scene, task.settings.transport, first, sample.sampler, indirect.rays());
+        direct.add(sample, radiance.direct);
+        indirect.add(sample, radiance.indirect);
+    });
+    return {direct.take(), indirect.take()};
 }
 
 void append(RoundResult& result, const RowResult& row) {
@@ -85,32 +135,57 @@ void append(RoundResult& result, const RowResult& row) {
     result.dropped.insert(result.dropped.end(), row.dropped.begin(), end);
 }
 
+RoundResult empty_result(const Round& round) {
+    RoundResult result;
+    result.sums.resize(std::size_t(round.rect.area()));
+    result.samples = round.samples();
+    return result;
+}
+
+/// rows[i] = render(row i), on `threads` threads; false if `cancelled` became true.
+template <class Row, class Render>
+bool render_rows(const Scene& scene, const Camera& camera, const RenderSettings& settings, const Round& round,
+                 int threads, const CancelFlag* cancelled, std::vector<Row>& rows, Render render) {
+    const PixelRect frame{0, 0, settings.width, settings.height};
+    CHECK(frame.contains(round.rect), round.rect, settings.width, settings.height);
+    const CameraFrame camera_frame = make_camera(camera, settings.width, settings.height);
+    const auto stopped = [&] { return cancelled && cancelled->load(std::memory_order_relaxed); };
+    rows.resize(std::size_t(round.rect.height));
+    parallel_for(round.rect.height, threads, [&](int row) {
+        if (!stopped())
+            rows[std::size_t(row)] =
+                render(RowTask{scene, camera_frame, settings, round, round.rect.y + row});
+    });
+    return !stopped();
+}
+
 }  // namespace
 
 std::optional<RoundResult> render_round(const Scene& scene, const Camera& camera,
                                         const RenderSettings& settings, LightPart part, const Round& round,
                                         int threads, const CancelFlag* cancelled) {
-    const PixelRect frame{0, 0, settings.width, settings.height};
-    CHECK(frame.contains(round.rect), round.rect, settings.width, settings.height);
-
-    const CameraFrame camera_frame = make_camera(camera, settings.width, settings.height);
-    RoundResult result;
-    result.sums.resize(std::size_t(round.rect.area()));
-    std::vector<RowResult> rows(std::size_t(round.rect.height));
-    const auto stopped = [&] { return cancelled && cancelled->load(std::memory_order_relaxed); };
-
-    parallel_for(round.rect.height, threads, [&](int row) {
-        if (stopped()) return;
-        PixelSum* sums = &result.sums[std::size_t(row) * std::size_t(round.rect.width)];
-        const int y = round.rect.y + row;
-        rows[std::size_t(row)] =
-            part == LightPart::direct
-                ? render_row<LightPart::direct>(scene, camera_frame, settings, round, y, sums)
-                : render_row<LightPart::indirect>(scene, camera_frame, settings, round, y, sums);
-    });
-    if (stopped()) return std::nullopt;
+    RoundResult result = empty_result(round);
+    std::vector<RowResult> rows;
+    const auto render = [&](const RowTask& task) {
+        return part == LightPart::direct ? render_row<LightPart::direct>(task, result)
+                                         : render_row<LightPart::indirect>(task, result);
+    };
+    if (!render_rows(scene, camera, settings, round, threads, cancelled, rows, render)) return std::nullopt;
     for (const RowResult& row : rows) append(result, row);
-    result.samples = round.samples();
+    return result;
+}
+
+std::optional<PartsResult> render_both_parts(const Scene& scene, const Camera& camera,
+                                             const RenderSettings& settings, const Round& round, int threads,
+                                             const CancelFlag* cancelled) {
+    PartsResult result{empty_result(round), empty_result(round)};
+    std::vector<PartsRow> rows;
+    const auto render = [&](const RowTask& task) { return render_parts_row(task, result); };
+    if (!render_rows(scene, camera, settings, round, threads, cancelled, rows, render)) return std::nullopt;
+    for (const PartsRow& row : rows) {
+        append(result.direct, row.direct);
+        append(result.indirect, row.indirect);
+    }
     return result;
 }
 

@@ -570,45 +570,61 @@ void ClientSession::send_lease(Server& server, const Lease& lease, TimeNs now) {
     send(Channel::frames, server.instance, std::move(message), server.peer.id());
 }
 
+/// The client's next own round. Alone it renders both parts, which then grow evenly: of one round together wherever it
+/// can; else direct light is all there is to do.
+std::optional<ClientSession::LocalWork> ClientSession::next_local_work(TimeNs now) {
+    LocalWork work;
+    const auto take_indirect = [&] {
+        if (!announced_alone_) return;
+        work.indirect = work_.grant_indirect(k_local_server, now, [](const Round&, std::uint32_t) {
+            return TimeNs{1} << 61;  // No deadline: if the client is gone, so is the account.
+        });
+    };
+    const bool direct_first = work_.indirect_progress() > work_.direct_progress();
+    if (direct_first) work.direct = work_.grant_direct(now);
+    if (!work.direct) take_indirect();
+    if (work.indirect)
+        work.direct = work_.grant_direct_beside(*work.indirect, now);
+    else if (!work.direct)
+        work.direct = work_.grant_direct(now);
+    if (!work.direct && !work.indirect) return std::nullopt;
+    return work;
+}
+
 void ClientSession::hand_out_locally(TimeNs now) {
     while (runner_.pending() < k_local_rounds) {
-        // Both parts of the image grow evenly when both are ours; else direct light is all there is to do.
-        const bool alone = announced_alone_;
-        const bool indirect_first = alone && work_.indirect_progress() < work_.direct_progress();
-        const auto local = [&]() -> std::optional<Lease> {
-            if (!alone) return std::nullopt;
-            const auto unlimited = [](const Round&, std::uint32_t) { return TimeNs{1} << 61; };
-            return work_.grant_indirect(k_local_server, now, unlimited);
-        };
-        LightPart part = indirect_first ? LightPart::indirect : LightPart::direct;
-        std::optional<Lease> lease = indirect_first ? local() : work_.grant_direct(now);
-        if (!lease) {
-            part = indirect_first ? LightPart::direct : LightPart::indirect;
-            lease = indirect_first ? work_.grant_direct(now) : local();
-        }
-        if (!lease) return;
+        const std::optional<LocalWork> work = next_local_work(now);
+        if (!work) return;
         const std::uint64_t ticket = ++last_ticket_;
-        local_leases_.emplace(ticket, *lease);
-        runner_.begin(
-            {ticket, part, work_.round_of(*lease), job_.scene, job_.state.camera, job_.state.settings});
+        const LightPart part = work->indirect ? LightPart::indirect : LightPart::direct;
+        const bool direct_too = work->indirect && work->direct;
+        const Round round = work_.round_of(work->indirect ? *work->indirect : *work->direct);
+        local_work_.emplace(ticket, *work);
+        runner_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too});
     }
 }
 
 void ClientSession::on_outcome(RoundOutcome& outcome) {
     const TimeNs now = monotonic_now();
-    const auto found = local_leases_.find(outcome.ticket);
-    const Lease lease = found->second;
-    local_leases_.erase(found);
-    if (!outcome.result) {  // Cancelled: its epoch ended, or the time limit was reached.
-        if (outcome.part == LightPart::direct)
+    const LocalWork work = local_work_.extract(outcome.ticket).mapped();
+    if (work.direct)
+        settle(LightPart::direct, *work.direct, work.indirect ? outcome.direct : outcome.result, now);
+    if (work.indirect) settle(LightPart::indirect, *work.indirect, outcome.result, now);
+}
+
+/// Books what the client's own renderer made of a lease.
+void ClientSession::settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result,
+                           TimeNs now) {
+    if (!result) {  // Cancelled: its epoch ended, or the time limit was reached.
+        if (part == LightPart::direct)
             work_.release_direct(lease, now);
         else
             work_.indirect_ledger().release(lease.id, k_local_server, now);
         return;
     }
     const ResultClaim claim{lease.id, lease.epoch, lease.unit, lease.first, lease.count, k_local_server};
-    const Commit commit = work_.commit(outcome.part, claim, outcome.result->sums, now);
-    if (commit.verdict == Verdict::accepted) count_result(*outcome.result, k_local_server);
+    const Commit commit = work_.commit(part, claim, result->sums, now);
+    if (commit.verdict == Verdict::accepted) count_result(*result, k_local_server);
     cancel_superseded(commit.superseded);
 }
 

@@ -149,6 +149,14 @@ std::optional<Lease> FrameWork::grant_direct(TimeNs now) {
     return key ? direct_.ledger.grant(k_local_server, *key, now, k_for_ever) : std::nullopt;
 }
 
+std::optional<Lease> FrameWork::grant_direct_beside(const Lease& indirect, TimeNs now) {
+    const RoundKey key = indirect_.ledger.key_of(indirect);
+    const LedgerPlan& plan = direct_.ledger.plan();
+    const SampleRange samples{indirect.first, indirect.count};
+    if (key.index >= plan.rounds_of(key.unit) || samples_of_round(plan, key) != samples) return std::nullopt;
+    return direct_.ledger.grant(k_local_server, key, now, k_for_ever);
+}
+
 Commit FrameWork::commit(LightPart part, const ResultClaim& claim, std::span<const PixelSum> sums,
                          TimeNs now) {
     Part& account = part == LightPart::direct ? direct_ : indirect_;

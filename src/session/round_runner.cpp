@@ -61,21 +61,42 @@ std::vector<RoundOutcome> RoundRunner::take_finished() {
     return outcomes;
 }
 
+void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) const {
+    CHECK(!job.direct_too || job.part == LightPart::indirect, job.ticket);
+    if (job.direct_too) {
+        auto both = render_both_parts(*job.scene, job.camera, job.settings, job.round, threads_, &cancelled);
+        if (!both) return;
+        outcome.result = std::move(both->indirect);
+        outcome.direct = std::move(both->direct);
+    } else {
+        outcome.result =
+            render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_, &cancelled);
+    }
+    if (outcome.result && job.part == LightPart::indirect && job.settings.filter == FilterPlace::server)
+        outcome.result->sums =
+            filter_tile(*job.scene, job.camera, job.settings, job.round, outcome.result->sums, threads_);
+}
+
 RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) const {
-    RoundOutcome outcome{job.ticket, job.part, job.round, std::nullopt, {}, monotonic_now(), 0};
+    RoundOutcome outcome;
+    outcome.ticket = job.ticket;
+    outcome.part = job.part;
+    outcome.round = job.round;
+    outcome.started = monotonic_now();
     try {
-        outcome.result = render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_,
-                                      &cancellation.flag());
-        if (outcome.result && job.part == LightPart::indirect && job.settings.filter == FilterPlace::server)
-            outcome.result->sums =
-                filter_tile(*job.scene, job.camera, job.settings, job.round, outcome.result->sums, threads_);
+        render(job, cancellation.flag(), outcome);
     } catch (const std::exception& error) {
         outcome.failure = error.what();  // Out of memory: nothing else here throws.
     }
     if (outcome.result && samples_per_second_ > 0) {
-        const double seconds = double(outcome.result->samples) / samples_per_second_;
+        const std::uint64_t samples =
+            outcome.result->samples + (outcome.direct ? outcome.direct->samples : 0);
+        const double seconds = double(samples) / samples_per_second_;
         cancellation.wait_until(outcome.started + from_seconds(seconds));
-        if (cancellation.flag().load()) outcome.result.reset();
+        if (cancellation.flag().load()) {
+            outcome.result.reset();
+            outcome.direct.reset();
+        }
     }
     outcome.duration = monotonic_now() - outcome.started;
     return outcome;

@@ -124,3 +124,22 @@ TEST_CASE("samples beyond the range of the sums are clamped and counted") {
     CHECK(result.sums.front() == PixelSum{3 << 20, 3 << 20, 3 << 20});
     CHECK(result.sums.back() == PixelSum{3 * k_max_quanta, 3 << 20, 3 << 20});
 }
+
+TEST_CASE("both parts at once are the parts one by one: sums, dropped samples, counts") {
+    const Scene scene = small_room();
+    const RenderSettings settings = small_settings(scene);
+    const Round round = whole_frame(settings, 3, 5);
+    const RoundResult direct = *render_round(scene, room_camera(), settings, LightPart::direct, round, 1);
+    const RoundResult indirect = *render_round(scene, room_camera(), settings, LightPart::indirect, round, 1);
+    for (const int threads : {1, 2, 5}) {
+        const PartsResult both = *render_both_parts(scene, room_camera(), settings, round, threads);
+        CHECK(both.direct.sums == direct.sums);
+        CHECK(both.indirect.sums == indirect.sums);
+        CHECK(both.direct.samples == round.samples());
+        CHECK(both.indirect.samples == round.samples());
+        CHECK(both.direct.rays + both.indirect.rays < direct.rays + indirect.rays);
+    }
+    CHECK(direct.sums != indirect.sums);  // Or equal bits would say little.
+    const CancelFlag cancelled(true);
+    CHECK_FALSE(render_both_parts(scene, room_camera(), settings, round, 1, &cancelled));
+}

@@ -168,3 +168,36 @@ TEST_CASE("a part of no samples is complete at once, and no picture waits for it
     CHECK(frame.work.has_image());
     CHECK(frame.work.complete());
 }
+
+TEST_CASE(
+    "the direct part of an indirect round is granted beside it: once, and only if the samples are the same") {
+    RenderSettings settings = small_frame();
+    settings.direct_spp = 8;
+    settings.spp = 10;
+    SmallWork frame(settings);
+    int pairs = 0, alone = 0;
+    while (const auto indirect = frame.grant(LightPart::indirect)) {
+        const auto direct = frame.work.grant_direct_beside(*indirect, 0);
+        CHECK_FALSE(frame.work.grant_direct_beside(*indirect, 0));
+        if (direct) {
+            CHECK(direct->unit == indirect->unit);
+            CHECK(direct->first == indirect->first);
+            CHECK(direct->count == indirect->count);
+            CHECK(frame.commit(LightPart::direct, *direct) == Verdict::accepted);
+        }
+        ++(direct ? pairs : alone);
+        CHECK(frame.commit(LightPart::indirect, *indirect) == Verdict::accepted);
+    }
+    CHECK(pairs == 2 * 15);  // 4 and 4 samples; the last 2 are indirect ones only.
+    CHECK(alone == 15);
+    CHECK(frame.work.complete());
+}
+
+TEST_CASE("direct rounds that were granted before are not granted beside an indirect one") {
+    RenderSettings settings = small_frame();
+    settings.direct_spp = settings.spp = 4;
+    SmallWork frame(settings);
+    CHECK(frame.finish(LightPart::direct) == 15);
+    while (const auto indirect = frame.grant(LightPart::indirect))
+        CHECK_FALSE(frame.work.grant_direct_beside(*indirect, 0));
+}

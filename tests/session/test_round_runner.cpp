@@ -69,6 +69,20 @@ TEST_CASE("every round that was begun has one outcome, in order, with the bits o
     CHECK(outcomes[0].result->sums != outcomes[2].result->sums);  // Or equal bits would say nothing.
 }
 
+TEST_CASE("the direct part of the same round comes beside the indirect one, if asked for") {
+    SmallRun run;
+    RoundJob job = run.job(2);
+    job.direct_too = true;
+    run.runner.begin(job);
+    const std::vector<RoundOutcome> outcomes = run.take(1);
+    REQUIRE((outcomes[0].result && outcomes[0].direct));
+    for (const LightPart part : {LightPart::direct, LightPart::indirect}) {
+        const auto alone = render_round(*run.scene, job.camera, job.settings, part, job.round, 1);
+        const auto& beside = part == LightPart::direct ? outcomes[0].direct : outcomes[0].result;
+        CHECK(beside->sums == alone->sums);
+    }
+}
+
 TEST_CASE("a speed cap stretches a round to the time that its samples take") {
     SmallRun run(2560);  // 256 samples: a tenth of a second.
     run.runner.begin(run.job(1));

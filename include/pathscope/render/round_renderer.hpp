@@ -42,4 +42,14 @@ using CancelFlag = std::atomic<bool>;
                                                       const Round& round, int threads,
                                                       const CancelFlag* cancelled = nullptr);
 
+/// Both parts of a round, by walks that the two share (integrator/both_parts.hpp): the sums of render_round(), bit by bit.
+struct PartsResult {
+    RoundResult direct;  ///< Its rays are counted in `indirect`.
+    RoundResult indirect;
+};
+[[nodiscard]] std::optional<PartsResult> render_both_parts(const Scene& scene, const Camera& camera,
+                                                           const RenderSettings& settings, const Round& round,
+                                                           int threads,
+                                                           const CancelFlag* cancelled = nullptr);
+
 }  // namespace pathscope

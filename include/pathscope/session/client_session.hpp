@@ -98,6 +98,10 @@ class ClientSession {
         SpeedEstimate speed{};
         TimeNs next_ping = 0;
     };
+    /// A round of the client's own renderer: one part of it, or both.
+    struct LocalWork {
+        std::optional<Lease> direct, indirect;
+    };
     struct LocalServer {
         ChildProcess process;
         std::string name;
@@ -151,9 +155,11 @@ class ClientSession {
     void hand_out_to(Server& server, TimeNs now);
     bool grant_to(Server& server, TimeNs now);
     void send_lease(Server& server, const Lease& lease, TimeNs now);
+    [[nodiscard]] std::optional<LocalWork> next_local_work(TimeNs now);
     void hand_out_locally(TimeNs now);
     void cancel_superseded(const std::vector<Lease>& leases);
     void on_outcome(RoundOutcome& outcome);
+    void settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result, TimeNs now);
     void count_result(const RoundResult& result, ServerId server);
     void enforce_time_limit(TimeNs now);
 
@@ -187,7 +193,7 @@ class ClientSession {
     TimeNs heartbeat_ = 0;
     FrameWork work_;
     std::uint64_t last_ticket_ = 0;
-    std::map<std::uint64_t, Lease> local_leases_;  ///< In the runner, by ticket.
+    std::map<std::uint64_t, LocalWork> local_work_;  ///< In the runner, by ticket.
     std::uint64_t saturated_ = 0;
     std::vector<DroppedSample> dropped_;  ///< The first k_max_dropped_listed.
     bool stopped_ = false;

@@ -56,6 +56,8 @@ class FrameWork {
                                       duration(round_of(*key), indirect_.ledger.attempts(*key)));
     }
     std::optional<Lease> grant_direct(TimeNs now);
+    /// The direct part of the same round, if it is still open: both together cost less than one after the other.
+    std::optional<Lease> grant_direct_beside(const Lease& indirect, TimeNs now);
     void release_direct(const Lease& lease, TimeNs now) {
         direct_.ledger.release(lease.id, lease.server, now);
     }

@@ -30,6 +30,7 @@ struct RoundJob {
     std::shared_ptr<const Scene> scene;
     Camera camera;
     RenderSettings settings;
+    bool direct_too = false;  ///< Of the same round, beside `part`, which must be indirect.
 };
 
 struct RoundOutcome {
@@ -37,6 +38,7 @@ struct RoundOutcome {
     LightPart part = LightPart::indirect;
     Round round;
     std::optional<RoundResult> result;  ///< Nothing if it was cancelled or failed.
+    std::optional<RoundResult> direct;  ///< Beside the result, if it was asked for too.
     std::string failure;                ///< Why it failed; empty if it did not.
     TimeNs started = 0;
     TimeNs duration = 0;
@@ -58,6 +60,7 @@ class RoundRunner {
   private:
     class Cancellation;
 
+    void render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) const;
     [[nodiscard]] RoundOutcome run(const RoundJob& job, Cancellation& cancellation) const;
 
     int threads_;
