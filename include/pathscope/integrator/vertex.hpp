@@ -47,6 +47,7 @@ struct Vertex {
     ShadedPoint shaded;
     Vec3 outgoing;          ///< Local.
     bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
+    int light_samples = 1;  ///< How many are taken here.
 
     [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
 };
@@ -63,8 +64,9 @@ struct Vertex {
 struct PathOrigin {
     LightReference reference;
     float pdf_solid_angle = 0;
-    bool delta = true;     ///< From the camera, or by a delta lobe: no light sample competes with this ray.
-    bool diffuse = false;  ///< The vertex is not specular.
+    bool delta = true;      ///< From the camera, or by a delta lobe: no light sample competes with this ray.
+    bool diffuse = false;   ///< The vertex is not specular.
+    int light_samples = 1;  ///< That were taken there: they compete with this ray.
 };
 
 struct NextDirection {
@@ -82,10 +84,10 @@ struct NextDirection {
     if (!sample) return std::nullopt;
     const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
     if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
-    return NextDirection{
-        direction,
-        sample->weight,
-        {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular}};
+    return NextDirection{direction,
+                         sample->weight,
+                         {vertex.light_reference(), sample->pdf_solid_angle, sample->specular,
+                          !vertex.specular, vertex.light_samples}};
 }
 
 }  // namespace pathscope
