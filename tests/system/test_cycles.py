@@ -40,6 +40,28 @@ f -4/1 -3/1 -2/1 -1/1
 usemtl paint
 f 1 2 3
 """
+BOX = """mtllib box.mtl
+usemtl paint
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+v 9 0 9
+v 9 1 9
+v 9 0 8
+vn 1 0 0
+f 1 4 3 2
+f 5 6 7 8
+f 1 2 6 5
+f 4 8 7 3
+f 1 5 8 4
+f 2 3 7 6
+f 9//1 10//1 11//1
+"""
 MTL = "newmtl lamp\nKd 0.5 0.5 0.5\nKe 1 2 3\nnewmtl paint\nmap_Kd -s 1 1 1 wood.png\n"
 
 
@@ -146,6 +168,26 @@ class Comparison(Folder):
             self.assertTrue(row["samples_per_cpu_s"] > 0 and 0 < row["cpu_s"] and 0 < row["rel_mse"] <= row["rel_mse_all"], row)
         self.assertLessEqual(RATIOS, set(file["ratios"][0]))
         self.check_means(file["agreement"][0])
+
+    def test_faces_without_normals_beside_faces_with(self):
+        """An OBJ may give normals to some faces only; the others are flat. Here that is a box: with normals made up by the
+        importer, its sides would be lit from where nothing shines."""
+        self.write(mtl="newmtl paint\nKd 0.7 0.7 0.7\n", lights=[{"type": "sun", "to_sun": [0, 1, 0], "irradiance": [3, 3, 3]}],
+                   camera={"position": [2, 1.5, 2.5], "look_at": [0.5, 0.5, 0.5]})
+        (self.folder / "box.obj").write_text(BOX)
+        path = self.folder / "cycles.json"
+        done = compare("--scene", self.folder / "scene.json", "--size", "32x32", "--spp", 4, "--reference-spp", 64, "--bounces", 1,
+                       "--runs", 1, "--json", path)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for ratio in json.loads(path.read_text())["agreement"][0]["mean_ratio"]:
+            self.assertLess(abs(ratio - 1), 0.02)
+
+    def test_a_black_picture_is_refused(self):
+        """One bounce from a lamp that shines away from the camera, in front of nothing."""
+        scene = self.write(mtl="newmtl lamp\nKe 1 1 1\nnewmtl paint\n", lights=[{"type": "emissive_mtl", "two_sided": False}],
+                           camera={"position": [0.5, 0.5, -2], "look_at": [0.5, 0.5, 0]})
+        done = compare("--scene", scene, "--size", "8x8", "--spp", 2, "--runs", 1, "--reference-spp", 4)
+        self.assertEqual((done.returncode, "black" in done.stderr.splitlines()[-1]), (2, True), done.stderr)
 
     def check_means(self, alike):
         for ratio, error in zip(alike["mean_ratio"], alike["mean_ratio_error"]):

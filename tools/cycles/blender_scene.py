@@ -69,9 +69,9 @@ def add_mesh(model, materials):
     if source.has_uvs:
         flat = array("f", (source.uvs[2 * i + axis] for i in corners for axis in (0, 1)))
         mesh.uv_layers.new(name="uv").data.foreach_set("uv", flat)
-    if source.has_normals:  # A zero normal leaves Blender's own.
+    if source.has_normals:  # A triangle without is flat: left smooth, Blender would make up normals for it.
         mesh.use_auto_smooth = True
-        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+        mesh.polygons.foreach_set("use_smooth", [any(source.normals[i]) for i in corners[::3]])
         mesh.normals_split_custom_set([source.normals[i] for i in corners])
     add_object("scene", mesh)
 
