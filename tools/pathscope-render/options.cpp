@@ -56,10 +56,8 @@ void add_image_options(CLI::App& app, RenderOptions& options) {
 void add_levers(CLI::App& app, RenderOptions& options) {
     TransportSettings& transport = options.settings.transport;
     add_lever(app, "--light", transport.light, "how a light is picked");
-    app.add_option(
-           "--light-samples", transport.light_samples,
-           fmt::format("light samples at the first vertex that is not specular; later ones take one ({})",
-                       transport.light_samples))
+    app.add_option("--light-samples", transport.light_samples,
+                   fmt::format("light samples per vertex ({})", transport.light_samples))
         ->check(CLI::Range(1, k_max_light_samples))
         ->type_name("N");
     add_lever(app, "--hemisphere", transport.hemisphere, "how the next direction is drawn");

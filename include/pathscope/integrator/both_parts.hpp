@@ -44,10 +44,9 @@ struct PartsRadiance {
         if (!indirect_lives || !hit || (settings.max_bounces > 0 && bounce == settings.max_bounces)) break;
 
         const BounceSample random(sampler, bounce);
-        Vertex vertex = make_vertex(scene, *hit, -ray.direction);
+        const Vertex vertex = make_vertex(scene, *hit, -ray.direction);
         if (!vertex.specular) ++diffuse_vertices;
         const bool is_first_diffuse = !vertex.specular && diffuse_vertices == 1;
-        vertex.light_samples = is_first_diffuse ? settings.light_samples : 1;
         if (!vertex.specular) {
             const Rgb light = throughput * sample_direct_light(scene, settings, vertex, random, rays);
             (is_first_diffuse ? radiance.direct : radiance.indirect) += light;

@@ -35,12 +35,12 @@ namespace pathscope {
     ++rays;
     if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
 
-    const float density = float(vertex.light_samples) * light->pdf_solid_angle;
+    const float density = float(settings.light_samples) * light->pdf_solid_angle;
     const float weight = light->delta ? 1.0f : mis_weight(settings.mis, density, bsdf.pdf_solid_angle);
     return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / density);
 }
 
-/// Light at the vertex by vertex.light_samples samples: a lattice of n points, turned by one random shift, so that sun
+/// Light at the vertex by settings.light_samples samples: a lattice of n points, turned by one random shift, so that sun
 /// and sky, or two lamps, are seldom picked by chance alone. Requires: !vertex.specular.
 [[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
                                              const Vertex& vertex, const BounceSample& random,
@@ -48,8 +48,8 @@ namespace pathscope {
     const float u_pick = random.light_pick();
     const Vec2 u_point = random.light_point();
     Rgb sum;
-    for (int i = 0; i < vertex.light_samples; ++i) {
-        const float shift = float(i) / float(vertex.light_samples);
+    for (int i = 0; i < settings.light_samples; ++i) {
+        const float shift = float(i) / float(settings.light_samples);
         const auto turned = [shift](float u) {
             return u + shift < 1 ? u + shift : std::max(u + shift - 1, 0.0f);
         };
@@ -78,7 +78,7 @@ namespace pathscope {
         hit ? sample_light_pdf(scene, settings.light, origin.reference, *hit)
             : sample_environment_pdf(scene, settings.light, origin.reference, ray.direction);
     return emitted *
-           mis_weight(settings.mis, origin.pdf_solid_angle, float(origin.light_samples) * light_pdf);
+           mis_weight(settings.mis, origin.pdf_solid_angle, float(settings.light_samples) * light_pdf);
 }
 
 }  // namespace pathscope

@@ -83,12 +83,11 @@ template <LightPart part, class Probe = NullPathProbe>
         if (!hit || (settings.max_bounces > 0 && bounce == settings.max_bounces)) break;
 
         const BounceSample random(sampler, bounce);
-        Vertex vertex = make_vertex(scene, *hit, -ray.direction);
+        const Vertex vertex = make_vertex(scene, *hit, -ray.direction);
         if (!vertex.specular) ++diffuse_vertices;
 
         // Light that reaches the vertex straight from an emitter.
         const bool is_first_diffuse = !vertex.specular && diffuse_vertices == 1;
-        vertex.light_samples = is_first_diffuse ? settings.light_samples : 1;
         if (!vertex.specular && is_first_diffuse == (part == LightPart::direct))
             add(bounce + 1, throughput * sample_direct_light(scene, settings, vertex, random, rays));
 

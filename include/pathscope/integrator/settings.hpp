@@ -3,8 +3,7 @@
 ///
 ///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
 ///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
-///   best:     light by power, two samples of it at the first vertex, BRDF sampling, MIS by the power heuristic,
-///             roulette by throughput, Owen-scrambled Sobol.
+///   best:     light by power, two samples of it per vertex, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
 ///
 /// Why: both converge to the same image, so a lesson can ask what each lever buys.
 /// Thread safety: values.   Test: tests/integrator/test_settings.cpp
@@ -28,9 +27,7 @@ constexpr const auto& enum_table(Setting) { return k_setting_names; }
 
 struct TransportSettings {
     LightSampling light = LightSampling::power;
-    /// At the first vertex that is not specular, at least 1. Later ones take one: what they add to the noise is little,
-    /// and most rays of a path would go there.
-    int light_samples = 2;
+    int light_samples = 2;  ///< Per vertex, at least 1.
     HemisphereSampling hemisphere = HemisphereSampling::bsdf;
     MisHeuristic mis = MisHeuristic::power;
     SamplerKind sampler = SamplerKind::sobol;

@@ -47,7 +47,6 @@ struct Vertex {
     ShadedPoint shaded;
     Vec3 outgoing;          ///< Local.
     bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
-    int light_samples = 1;  ///< How many are taken here.
 
     [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
 };
@@ -64,9 +63,8 @@ struct Vertex {
 struct PathOrigin {
     LightReference reference;
     float pdf_solid_angle = 0;
-    bool delta = true;      ///< From the camera, or by a delta lobe: no light sample competes with this ray.
-    bool diffuse = false;   ///< The vertex is not specular.
-    int light_samples = 1;  ///< That were taken there: they compete with this ray.
+    bool delta = true;     ///< From the camera, or by a delta lobe: no light sample competes with this ray.
+    bool diffuse = false;  ///< The vertex is not specular.
 };
 
 struct NextDirection {
@@ -84,10 +82,10 @@ struct NextDirection {
     if (!sample) return std::nullopt;
     const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
     if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
-    return NextDirection{direction,
-                         sample->weight,
-                         {vertex.light_reference(), sample->pdf_solid_angle, sample->specular,
-                          !vertex.specular, vertex.light_samples}};
+    return NextDirection{
+        direction,
+        sample->weight,
+        {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular}};
 }
 
 }  // namespace pathscope
