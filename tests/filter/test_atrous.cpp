@@ -2,48 +2,20 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "filter/filter_pictures.hpp"
 #include "pathscope/image/metrics.hpp"
-#include "pathscope/math/random.hpp"
 
 #include "testing.hpp"
 
 using namespace pathscope;
+using namespace pathscope::testing;
 
 namespace {
 
-constexpr float k_inf = std::numeric_limits<float>::infinity();
-const float k_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array k_spline{3 / 8.0, 1 / 4.0, 1 / 16.0};
-
-Image random_image(int width, int height, std::uint32_t seed) {
-    HashRng rng(seed);
-    Image image(width, height);
-    for (Rgb& pixel : image.pixels) pixel = {rng.next_float(), rng.next_float(), 4 * rng.next_float()};
-    return image;
-}
-
-Guides flat_guides(int width, int height) {
-    return {Image(width, height, {0, 0, 1}), Image(width, height, {0.5f, 0.5f, 0.5f}),
-            Plane(width, height, 3.0f)};
-}
-
-/// Tilted normals, a textured albedo, a rough depth, some sky.
-Guides random_guides(int width, int height, std::uint32_t seed) {
-    HashRng rng(seed);
-    Guides guides = flat_guides(width, height);
-    for (std::size_t i = 0; i < guides.depth.pixels.size(); ++i) {
-        const bool sky = rng.next_float() < 0.1f;
-        guides.normal.pixels[i] =
-            sky ? Vec3{} : normalize(Vec3{0.3f * rng.next_float(), 0.3f * rng.next_float(), 1});
-        guides.albedo.pixels[i] = {0.2f * rng.next_float(), 0.1f * rng.next_float(), 0.3f};
-        guides.depth.pixels[i] = sky ? k_inf : 5 + 0.5f * rng.next_float();
-    }
-    return guides;
-}
 
 /// Normal, depth and albedo have in all filters the same weight: it is taken from the equation of the other one.
 double guide_weight(const Guides& guides, const AtrousParams& params, int px, int py, int qx, int qy) {

@@ -1,44 +1,15 @@
 #include "pathscope/filter/joint_bilateral.hpp"
 
 #include <cmath>
-#include <limits>
 
-#include "pathscope/math/random.hpp"
+#include "filter/filter_pictures.hpp"
 
 #include "testing.hpp"
 
 using namespace pathscope;
+using namespace pathscope::testing;
 
 namespace {
-
-constexpr float k_inf = std::numeric_limits<float>::infinity();
-const float k_nan = std::numeric_limits<float>::quiet_NaN();
-
-Image random_image(int width, int height, std::uint32_t seed) {
-    HashRng rng(seed);
-    Image image(width, height);
-    for (Rgb& pixel : image.pixels) pixel = {rng.next_float(), rng.next_float(), 4 * rng.next_float()};
-    return image;
-}
-
-Guides flat_guides(int width, int height) {
-    return {Image(width, height, {0, 0, 1}), Image(width, height, {0.5f, 0.5f, 0.5f}),
-            Plane(width, height, 3.0f)};
-}
-
-/// Guides with structure in each of the three: tilted normals, a textured albedo, sloped depth, some sky.
-Guides random_guides(int width, int height, std::uint32_t seed) {
-    HashRng rng(seed);
-    Guides guides = flat_guides(width, height);
-    for (std::size_t i = 0; i < guides.depth.pixels.size(); ++i) {
-        const Vec3 tilt{0.3f * rng.next_float(), 0.3f * rng.next_float(), 1};
-        const bool sky = rng.next_float() < 0.1f;
-        guides.normal.pixels[i] = sky ? Vec3{} : normalize(tilt);
-        guides.albedo.pixels[i] = {0.2f * rng.next_float(), 0.1f * rng.next_float(), 0.3f};
-        guides.depth.pixels[i] = !sky ? 5 + 0.5f * rng.next_float() : rng.next_float() < 0.5f ? 0 : k_inf;
-    }
-    return guides;
-}
 
 /// The equation, one pixel at a time, in double.
 Image filtered_by_equation(const Image& noisy, const Guides& guides, const BilateralParams& params) {

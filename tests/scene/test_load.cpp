@@ -11,6 +11,8 @@
 #include "memory_files.hpp"
 #include "testing.hpp"
 
+#include "scene/same_parts.hpp"
+
 using namespace pathscope;
 namespace fs = std::filesystem;
 
@@ -78,18 +80,6 @@ std::string tga(std::vector<std::uint8_t> bgra) {
     bytes[16] = char(8 * bgra.size());
     bytes.append(bgra.begin(), bgra.end());
     return bytes;
-}
-
-void check_same(const SceneParts& a, const SceneParts& b) {
-    CHECK(a.mesh.positions == b.mesh.positions);
-    CHECK(a.mesh.normals == b.mesh.normals);
-    CHECK(a.mesh.uvs == b.mesh.uvs);
-    CHECK(a.mesh.triangles == b.mesh.triangles);
-    CHECK(a.mesh.materials == b.mesh.materials);
-    CHECK(a.materials == b.materials);
-    CHECK(a.textures == b.textures);
-    CHECK(a.envmap.has_value() == b.envmap.has_value());
-    if (a.envmap && b.envmap) CHECK(*a.envmap == *b.envmap);
 }
 
 void write(const fs::path& path, std::string_view bytes) {
@@ -373,7 +363,7 @@ TEST_CASE("a scene loads into the same bits from a folder and from a manifest") 
     ManifestFiles sent(manifest, [&](const Digest& hash) { return cache.path() / to_hex(hash); });
     const auto scene = parse_scene_file(to_json(opened->file), "state");
     REQUIRE(scene);
-    check_same(parts_of(*scene, sent), opened->parts);
+    testing::check_same(parts_of(*scene, sent), opened->parts);
 
     // Other options need other files: that is an error on the server, not a silent difference.
     ManifestFiles other({}, [&](const Digest&) { return cache.path(); });

@@ -16,6 +16,8 @@
 #include "memory_files.hpp"
 #include "testing.hpp"
 
+#include "scene/same_parts.hpp"
+
 using namespace pathscope;
 using namespace pathscope::testing;
 namespace fs = std::filesystem;
@@ -71,16 +73,6 @@ SceneParts load(const std::string& obj, const std::optional<MeshCache>& cache, b
     auto parts = load_scene_parts(scene, files, {.smoothing = smoothing}, cache);
     REQUIRE_MESSAGE(parts, (parts ? "" : parts.error().message));
     return std::move(*parts);
-}
-
-void check_same(const SceneParts& a, const SceneParts& b) {
-    CHECK(a.mesh.positions == b.mesh.positions);
-    CHECK(a.mesh.normals == b.mesh.normals);
-    CHECK(a.mesh.uvs == b.mesh.uvs);
-    CHECK(a.mesh.triangles == b.mesh.triangles);
-    CHECK(a.mesh.materials == b.mesh.materials);
-    CHECK(a.materials == b.materials);
-    CHECK(a.degenerate_triangles == b.degenerate_triangles);
 }
 
 std::vector<fs::path> files_in(const fs::path& folder) {
