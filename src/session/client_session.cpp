@@ -580,8 +580,7 @@ std::optional<ClientSession::LocalWork> ClientSession::next_local_work(TimeNs no
             return TimeNs{1} << 61;  // No deadline: if the client is gone, so is the account.
         });
     };
-    const bool direct_first = work_.indirect_progress() > work_.direct_progress();
-    if (direct_first) work.direct = work_.grant_direct(now);
+    if (work_.indirect_progress() > work_.direct_progress()) work.direct = work_.grant_direct(now);
     if (!work.direct) take_indirect();
     if (work.indirect)
         work.direct = work_.grant_direct_beside(*work.indirect, now);

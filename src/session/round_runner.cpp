@@ -87,6 +87,8 @@ RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) c
         render(job, cancellation.flag(), outcome);
     } catch (const std::exception& error) {
         outcome.failure = error.what();  // Out of memory: nothing else here throws.
+        outcome.result.reset();          // Half done, it may lack the filter.
+        outcome.direct.reset();
     }
     if (outcome.result && samples_per_second_ > 0) {
         const std::uint64_t samples =

@@ -5,12 +5,16 @@
 
 namespace pathscope::testing {
 
+inline void check_same(const Mesh& a, const Mesh& b) {
+    CHECK(a.positions == b.positions);
+    CHECK(a.normals == b.normals);
+    CHECK(a.uvs == b.uvs);
+    CHECK(a.triangles == b.triangles);
+    CHECK(a.materials == b.materials);
+}
+
 inline void check_same(const SceneParts& a, const SceneParts& b) {
-    CHECK(a.mesh.positions == b.mesh.positions);
-    CHECK(a.mesh.normals == b.mesh.normals);
-    CHECK(a.mesh.uvs == b.mesh.uvs);
-    CHECK(a.mesh.triangles == b.mesh.triangles);
-    CHECK(a.mesh.materials == b.mesh.materials);
+    check_same(a.mesh, b.mesh);
     CHECK(a.materials == b.materials);
     CHECK(a.textures == b.textures);
     CHECK(a.envmap.has_value() == b.envmap.has_value());

@@ -56,11 +56,7 @@ ObjModel model_of(const std::string& obj) {
 }
 
 void check_same(const ObjModel& a, const ObjModel& b) {
-    CHECK(a.mesh.positions == b.mesh.positions);
-    CHECK(a.mesh.normals == b.mesh.normals);
-    CHECK(a.mesh.uvs == b.mesh.uvs);
-    CHECK(a.mesh.triangles == b.mesh.triangles);
-    CHECK(a.mesh.materials == b.mesh.materials);
+    testing::check_same(a.mesh, b.mesh);
     CHECK(a.material_names == b.material_names);
     CHECK(a.material_files == b.material_files);
     CHECK(a.degenerate_triangles == b.degenerate_triangles);

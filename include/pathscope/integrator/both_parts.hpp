@@ -4,7 +4,7 @@
 ///     estimate_both_parts(...)  =  { estimate_radiance<direct>(...), estimate_radiance<indirect>(...) },   bit by bit
 ///
 /// Why: each part alone walks from the camera to the first vertex that is not specular, and takes one ray on from there.
-/// Whoever renders both, a client without servers, saves that: a third of the rays of a closed room.
+/// Whoever renders both, a client without servers, saves that: a fifth of the rays of a Cornell box.
 /// The text to read is path_estimator.hpp; here the same steps keep two accounts. They part at the first roulette, which
 /// the direct part does not play: then a ray that the indirect part would not have traced may still be traced for the
 /// direct one.
