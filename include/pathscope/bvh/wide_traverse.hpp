@@ -43,7 +43,7 @@ template <class Accept>
             &accept};
 }
 
-inline constexpr std::size_t k_packet_rays = 16;
+inline constexpr std::size_t k_packet_rays = 32;
 
 /// The walk for one instruction set.
 struct WideKernel {
@@ -87,7 +87,7 @@ template <class Accept>
     return detail::k_wide_kernel.count_any_hit(bvh, ray, hit_filter(accept), counts);
 }
 
-// Packets: up to k_packet_rays rays of neighbouring pixels, three times as fast together as one by one. The answers are those
+// Packets: up to k_packet_rays rays of neighbouring pixels, several times as fast together as one by one. The answers are those
 // of the rays one by one, bit for bit; rays that are too different for a packet are traced so.
 
 /// closest[i] = closest_hit(bvh, rays[i], accept). Requires: at most k_packet_rays of them, as many places in closest.

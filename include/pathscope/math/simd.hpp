@@ -77,6 +77,10 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 [[nodiscard]] inline Float8 operator/(Float8 a, Float8 b) { return {_mm256_div_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 min(Float8 a, Float8 b) { return {_mm256_min_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) { return {_mm256_max_ps(a.lanes, b.lanes)}; }
+/// a b + c, rounded once or twice: for estimates with a margin, not for results.
+[[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) {
+    return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
 /// The smallest of the eight.
 [[nodiscard]] inline float least(Float8 a) {
     __m128 m = _mm_min_ps(_mm256_castps256_ps128(a.lanes), _mm256_extractf128_ps(a.lanes, 1));
@@ -127,6 +131,9 @@ inline void store(double* eight, Double8 a) { _mm512_store_pd(eight, a.lanes); }
     return {_mm512_fmsub_pd(a.lanes, b.lanes, c.lanes)};
 }
 /// a where the lane is chosen, else b.
+[[nodiscard]] inline Float8 select(Lanes chosen, Float8 a, Float8 b) {
+    return {_mm256_mask_blend_ps(static_cast<__mmask8>(chosen), b.lanes, a.lanes)};
+}
 [[nodiscard]] inline Double8 select(Lanes chosen, Double8 a, Double8 b) {
     return {_mm512_mask_blend_pd(static_cast<__mmask8>(chosen), b.lanes, a.lanes)};
 }
@@ -180,6 +187,11 @@ inline void store(double* eight, Double8 a) {
 }
 [[nodiscard]] inline Double8 fused_multiply_subtract(Double8 a, Double8 b, Double8 c) {
     return {_mm256_fmsub_pd(a.low, b.low, c.low), _mm256_fmsub_pd(a.high, b.high, c.high)};
+}
+[[nodiscard]] inline Float8 select(Lanes chosen, Float8 a, Float8 b) {
+    const __m256i bits = _mm256_set_epi32(128, 64, 32, 16, 8, 4, 2, 1);
+    const __m256i mask = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(chosen)), bits);
+    return {_mm256_blendv_ps(b.lanes, a.lanes, _mm256_castsi256_ps(_mm256_cmpeq_epi32(mask, bits)))};
 }
 [[nodiscard]] inline Double8 select(Lanes chosen, Double8 a, Double8 b) {
     const __m256i bits = _mm256_set_epi64x(8, 4, 2, 1);
@@ -235,6 +247,12 @@ inline void store(float* eight, Float8 a) {
 }
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) {
     return lanewise::each(a, b, [](float x, float y) { return x > y ? x : y; });
+}
+[[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) { return a * b + c; }
+[[nodiscard]] inline Float8 select(Lanes chosen, Float8 a, Float8 b) {
+    Float8 result;
+    for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = (chosen >> i & 1) != 0 ? a.lanes[i] : b.lanes[i];
+    return result;
 }
 [[nodiscard]] inline float least(Float8 a) { return *std::min_element(a.lanes.begin(), a.lanes.end()); }
 [[nodiscard]] inline float greatest(Float8 a) { return *std::max_element(a.lanes.begin(), a.lanes.end()); }
@@ -389,23 +407,80 @@ inline void store(float* four, Float4 a) {
 
 #endif
 
-// ---- As many floats as one register holds: for loops over pixels, where any number at once gives the same bits.
+// ---- Sixteen floats: a number of each ray of a packet.
 
 #if PATHSCOPE_SIMD_AT_LEAST(avx512)
 
 struct Float16 {
     __m512 lanes;
 };
+
+/// Requires: aligned to 64 bytes.
+[[nodiscard]] inline Float16 load16(const float* sixteen) { return {_mm512_load_ps(sixteen)}; }
+inline void store(float* sixteen, Float16 a) { _mm512_store_ps(sixteen, a.lanes); }
+[[nodiscard]] inline Float16 broadcast16(float a) { return {_mm512_set1_ps(a)}; }
+[[nodiscard]] inline Float16 operator+(Float16 a, Float16 b) { return {_mm512_add_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 operator-(Float16 a, Float16 b) { return {_mm512_sub_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 operator*(Float16 a, Float16 b) { return {_mm512_mul_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 operator/(Float16 a, Float16 b) { return {_mm512_div_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 min(Float16 a, Float16 b) { return {_mm512_min_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 max(Float16 a, Float16 b) { return {_mm512_max_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Lanes at_most(Float16 a, Float16 b) {
+    return _mm512_cmp_ps_mask(a.lanes, b.lanes, _CMP_LE_OQ);
+}
+/// a b + c, rounded once or twice: for estimates with a margin, not for results.
+[[nodiscard]] inline Float16 about_multiply_add(Float16 a, Float16 b, Float16 c) {
+    return {_mm512_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
+/// a where the lane is chosen, else b.
+[[nodiscard]] inline Float16 select(Lanes chosen, Float16 a, Float16 b) {
+    return {_mm512_mask_blend_ps(static_cast<__mmask16>(chosen), b.lanes, a.lanes)};
+}
+[[nodiscard]] inline float least(Float16 a) { return _mm512_reduce_min_ps(a.lanes); }
+[[nodiscard]] inline float greatest(Float16 a) { return _mm512_reduce_max_ps(a.lanes); }
+
+#else
+
+struct Float16 {
+    Float8 low, high;
+};
+
+[[nodiscard]] inline Float16 load16(const float* sixteen) { return {load(sixteen), load(sixteen + 8)}; }
+inline void store(float* sixteen, Float16 a) {
+    store(sixteen, a.low);
+    store(sixteen + 8, a.high);
+}
+[[nodiscard]] inline Float16 broadcast16(float a) { return {broadcast(a), broadcast(a)}; }
+[[nodiscard]] inline Float16 operator+(Float16 a, Float16 b) { return {a.low + b.low, a.high + b.high}; }
+[[nodiscard]] inline Float16 operator-(Float16 a, Float16 b) { return {a.low - b.low, a.high - b.high}; }
+[[nodiscard]] inline Float16 operator*(Float16 a, Float16 b) { return {a.low * b.low, a.high * b.high}; }
+[[nodiscard]] inline Float16 operator/(Float16 a, Float16 b) { return {a.low / b.low, a.high / b.high}; }
+[[nodiscard]] inline Float16 min(Float16 a, Float16 b) { return {min(a.low, b.low), min(a.high, b.high)}; }
+[[nodiscard]] inline Float16 max(Float16 a, Float16 b) { return {max(a.low, b.low), max(a.high, b.high)}; }
+[[nodiscard]] inline Lanes at_most(Float16 a, Float16 b) {
+    return at_most(a.low, b.low) | at_most(a.high, b.high) << 8;
+}
+[[nodiscard]] inline Float16 about_multiply_add(Float16 a, Float16 b, Float16 c) {
+    return {about_multiply_add(a.low, b.low, c.low), about_multiply_add(a.high, b.high, c.high)};
+}
+[[nodiscard]] inline Float16 select(Lanes chosen, Float16 a, Float16 b) {
+    return {select(chosen & 0xff, a.low, b.low), select(chosen >> 8, a.high, b.high)};
+}
+[[nodiscard]] inline float least(Float16 a) { return least(min(a.low, a.high)); }
+[[nodiscard]] inline float greatest(Float16 a) { return greatest(max(a.low, a.high)); }
+
+#endif
+
+// ---- As many floats as one register holds: for loops over pixels, where any number at once gives the same bits.
+
+#if PATHSCOPE_SIMD_AT_LEAST(avx512)
+
 using Floats = Float16;
 
 /// At any address.
 [[nodiscard]] inline Floats load_floats(const float* many) { return {_mm512_loadu_ps(many)}; }
 inline void store_floats(float* many, Floats a) { _mm512_storeu_ps(many, a.lanes); }
-[[nodiscard]] inline Floats broadcast_floats(float a) { return {_mm512_set1_ps(a)}; }
-[[nodiscard]] inline Floats operator+(Floats a, Floats b) { return {_mm512_add_ps(a.lanes, b.lanes)}; }
-[[nodiscard]] inline Floats operator-(Floats a, Floats b) { return {_mm512_sub_ps(a.lanes, b.lanes)}; }
-[[nodiscard]] inline Floats operator*(Floats a, Floats b) { return {_mm512_mul_ps(a.lanes, b.lanes)}; }
-[[nodiscard]] inline Floats min(Floats a, Floats b) { return {_mm512_min_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast16(a); }
 /// a 2^n, where n stands in the last bits of `n_below` as a whole number, as it does in 0x1.8p23f + n.
 /// Requires: the result is a normal number, or a is 1 and n is -127, which gives 0.
 [[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
