@@ -144,7 +144,7 @@ TEST_CASE("every lever alone leaves the image as it is") {
     variants[4].mis = MisHeuristic::balance;
     variants[5].roulette.kind = Roulette::constant;
     variants[6].light_samples = 3;
-    variants[7].roulette.kind = Roulette::throughput;
+    variants[7].roulette.kind = Roulette::efficiency;
     for (std::size_t i = 0; i < variants.size(); ++i) {
         CAPTURE(i);
         CHECK(same_mean(room_picture(scene, variants[i], size, samples), best));
