@@ -191,13 +191,12 @@ float direction_pdf(const Scene& scene, const Light& light, const LightReference
 
 std::optional<LightSample> sample_light(const Scene& scene, LightSampling sampling,
                                         const LightReference& reference, float u_pick, Vec2 u) {
-    if (scene.lights.empty()) return std::nullopt;
-    const auto pick = scene.lights.pick[std::size_t(sampling)].sample(u_pick);
-    const auto light = std::uint32_t(pick.index);
-    const Request request{scene, sampling, reference, pick.pmf, u};
+    const auto pick = pick_light(scene.lights, sampling, reference, u_pick);
+    if (!pick) return std::nullopt;
+    const Request request{scene, sampling, reference, pick->probability, u};
     auto result =
-        std::visit([&](const auto& kind) { return sample(request, kind); }, scene.lights.lights[light]);
-    if (result) result->light = light;
+        std::visit([&](const auto& kind) { return sample(request, kind); }, scene.lights.lights[pick->light]);
+    if (result) result->light = pick->light;
     return result;
 }
 
@@ -210,7 +209,7 @@ float sample_light_pdf(const Scene& scene, LightSampling sampling, const LightRe
         return 0;
 
     const Light& light = scene.lights.lights[hit.light];
-    const float probability = pick_probability(scene.lights, sampling, hit.light);
+    const float probability = pick_probability(scene.lights, sampling, reference, hit.light);
     if (const auto* sphere = std::get_if<SphereLight>(&light))
         return probability * sphere_pdf(sampling, reference, to_light, scene.spheres[sphere->sphere], normal);
     return probability * triangle_pdf(to_light, std::get<TriangleLight>(light), normal);
@@ -220,7 +219,7 @@ float sample_environment_pdf(const Scene& scene, LightSampling sampling, const L
                              Vec3 direction) {
     float sum = 0;
     for (const std::uint32_t light : scene.lights.infinite)
-        sum += pick_probability(scene.lights, sampling, light) *
+        sum += pick_probability(scene.lights, sampling, reference, light) *
                direction_pdf(scene, scene.lights.lights[light], reference, direction);
     return sum;
 }

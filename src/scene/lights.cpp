@@ -67,6 +67,95 @@ bool seen_by_escaping_rays(const Light& light) {
     return std::holds_alternative<SkyLight>(light) || std::holds_alternative<EnvironmentLight>(light);
 }
 
+// ---- Picking with a tree.
+
+constexpr std::uint32_t k_steps = 1u << 24;  // Uniform numbers are multiples of 1 / k_steps.
+
+/// On a plane through the point, if nothing stands between; of a light at infinity.
+double irradiance_of(const LightTable& table, const Light& light, const LightReference& reference) {
+    if (const auto* sun = std::get_if<SunLight>(&light))
+        return luminance(sun->irradiance) * std::max(0.0f, dot(reference.normal, sun->to_sun));
+    if (const auto* sky = std::get_if<SkyLight>(&light)) return k_double_pi * luminance(sky->radiance);
+    const auto& environment = std::get<EnvironmentLight>(light);
+    return k_double_pi * luminance(table.environments[environment.map].mean_radiance);
+}
+
+/// How the steps are shared out between the lights at infinity, in their order, and the tree, which takes what is left.
+class TreeShares {
+  public:
+    TreeShares(const LightTable& table, const LightReference& reference)
+        : table_(table), reference_(reference) {
+        if (table.beside_tree.empty()) return;
+        total_ = table.tree.irradiance(reference);
+        for (const std::uint32_t light : table.beside_tree) total_ += irradiance_of_light(light);
+        equal_ = 0.5 / double(table.beside_tree.size() + 1);
+    }
+    [[nodiscard]] std::uint32_t of(std::uint32_t light) const {
+        const double by_irradiance = total_ > 0 ? 0.5 * irradiance_of_light(light) / total_ : 0;
+        return std::max(1u, std::uint32_t((equal_ + by_irradiance) * k_steps));
+    }
+    [[nodiscard]] std::uint32_t of_tree() const {
+        std::uint32_t rest = k_steps;
+        for (const std::uint32_t light : table_.beside_tree) rest -= of(light);
+        return rest;
+    }
+
+  private:
+    [[nodiscard]] double irradiance_of_light(std::uint32_t light) const {
+        return irradiance_of(table_, table_.lights[light], reference_);
+    }
+
+    const LightTable& table_;
+    const LightReference& reference_;
+    double total_ = 0, equal_ = 0;
+};
+
+std::optional<LightPick> pick_by_tree(const LightTable& table, const LightReference& reference, float u) {
+    auto step = std::uint32_t(u * float(k_steps));
+    const TreeShares shares(table, reference);
+    for (const std::uint32_t light : table.beside_tree) {
+        const std::uint32_t steps = shares.of(light);
+        if (step < steps) return LightPick{light, float(steps) / k_steps};
+        step -= steps;
+    }
+    const auto pick = table.tree.pick(reference, step, shares.of_tree());
+    if (!pick) return std::nullopt;
+    return LightPick{table.in_tree[pick->light], float(pick->steps) / k_steps};
+}
+
+float tree_probability(const LightTable& table, const LightReference& reference, std::uint32_t light) {
+    const TreeShares shares(table, reference);
+    const std::uint32_t place = table.of_tree[light];
+    return float(place == k_no_light ? shares.of(light)
+                                     : table.tree.steps_to(reference, place, shares.of_tree())) /
+           k_steps;
+}
+
+/// A light's own share of the steps must not be more than the tree has, however many lights are beside it.
+bool pays(std::size_t finite, std::size_t beside) {
+    return finite >= k_least_tree_lights && finite <= LightTree::k_most_lights / (beside + 1);
+}
+
+void make_tree(LightTable& table, std::span<const std::optional<LightBounds>> bounds) {
+    std::vector<LightBounds> finite;
+    table.of_tree.assign(table.lights.size(), k_no_light);
+    for (std::uint32_t light = 0; light < table.lights.size(); ++light) {
+        if (!bounds[light]) {
+            table.beside_tree.push_back(light);
+            continue;
+        }
+        table.of_tree[light] = std::uint32_t(finite.size());
+        table.in_tree.push_back(light);
+        finite.push_back(*bounds[light]);
+    }
+    if (pays(finite.size(), table.beside_tree.size())) table.tree = LightTree::make(finite);
+}
+
+/// Where there is no tree, power takes its place.
+LightSampling in_effect(const LightTable& table, LightSampling sampling) {
+    return sampling == LightSampling::tree && table.tree.empty() ? LightSampling::power : sampling;
+}
+
 }  // namespace
 
 SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg) {
@@ -97,13 +186,32 @@ double light_area(const Light& light) {
     return sphere ? 4 * k_double_pi * sphere->radius * sphere->radius : 0;
 }
 
-void finish_light_table(LightTable& table, float scene_radius) {
+void finish_light_table(LightTable& table, float scene_radius,
+                        std::span<const std::optional<LightBounds>> bounds) {
+    CHECK(bounds.size() == table.lights.size(), bounds.size(), table.lights.size());
     table.infinite.clear();
     for (std::uint32_t i = 0; i < table.lights.size(); ++i)
         if (seen_by_escaping_rays(table.lights[i])) table.infinite.push_back(i);
     if (table.empty()) return;
     table.pick[std::size_t(LightSampling::area)] = make_pick(weights_by_area(table));
     table.pick[std::size_t(LightSampling::power)] = make_pick(weights_by_power(table, scene_radius));
+    make_tree(table, bounds);
+}
+
+std::optional<LightPick> pick_light(const LightTable& table, LightSampling sampling,
+                                    const LightReference& reference, float u) {
+    if (table.empty()) return std::nullopt;
+    sampling = in_effect(table, sampling);
+    if (sampling == LightSampling::tree) return pick_by_tree(table, reference, u);
+    const auto pick = table.pick[std::size_t(sampling)].sample(u);
+    return LightPick{std::uint32_t(pick.index), pick.pmf};
+}
+
+float pick_probability(const LightTable& table, LightSampling sampling, const LightReference& reference,
+                       std::uint32_t light) {
+    sampling = in_effect(table, sampling);
+    return sampling == LightSampling::tree ? tree_probability(table, reference, light)
+                                           : pick_probability(table, sampling, light);
 }
 
 }  // namespace pathscope

@@ -155,6 +155,43 @@ struct AddLight {
     }
 };
 
+// ---- Where the lights are.
+
+std::optional<LightBounds> bounds_of(const Scene& scene, const TriangleLight& light) {
+    const TriangleCorners where = corners(scene.mesh, light.triangle);
+    LightBounds bounds;
+    for (const Vec3 corner : {where.a, where.b, where.c}) bounds.box.add(corner);
+    bounds.normal = surface_point(scene.mesh, {0, 1 / 3.0f, 1 / 3.0f, light.triangle}).geometric_normal;
+    bounds.side = light.two_sided ? ShinesTo::both_sides : ShinesTo::front;
+    bounds.intensity = double(luminance(light.mean_radiance)) * light.area;
+    return bounds;
+}
+std::optional<LightBounds> bounds_of(const Scene& scene, const SphereLight& light) {
+    const Vec3 half{light.radius, light.radius, light.radius};
+    const Vec3 centre = scene.spheres[light.sphere].centre;
+    LightBounds bounds;
+    bounds.box = {centre - half, centre + half};
+    bounds.intensity = light_area(light) / 4 * luminance(light.radiance);  // As a disc.
+    return bounds;
+}
+std::optional<LightBounds> bounds_of(const Scene&, const PointLight& light) {
+    LightBounds bounds;
+    bounds.box = {light.position, light.position};
+    bounds.intensity = luminance(light.intensity);
+    return bounds;
+}
+template <class LightAtInfinity>
+std::optional<LightBounds> bounds_of(const Scene&, const LightAtInfinity&) {
+    return std::nullopt;
+}
+
+std::vector<std::optional<LightBounds>> light_bounds(const Scene& scene) {
+    std::vector<std::optional<LightBounds>> bounds;
+    for (const Light& light : scene.lights.lights)
+        bounds.push_back(std::visit([&](const auto& kind) { return bounds_of(scene, kind); }, light));
+    return bounds;
+}
+
 // ---- How bright it is.
 
 struct Brightness {
@@ -219,7 +256,7 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBui
     add_sphere_lights(scene);
     for (const LightSpec& light : file.lights)
         if (auto added = std::visit(AddLight{file, parts, scene.lights}, light); !added) return added.error();
-    finish_light_table(scene.lights, scene_radius(scene));
+    finish_light_table(scene.lights, scene_radius(scene), light_bounds(scene));
     measure_brightness(scene);
     if (scene.lights.empty()) log_warning("The scene has no light: the image will be black.");
     return scene;

@@ -58,6 +58,30 @@ inline Scene small_room() {
     return small_scene(std::move(parts), {EmissiveMtlSpec{false}});
 }
 
+/// The same kind of room with a glossy floor and 24 small lamps, half of which shine at the ceiling; those behind a wall
+/// are brighter. There is a sky as well, which the walls shut out.
+inline Scene room_of_lamps() {
+    SceneParts parts = empty_parts();
+    add_box(parts, {-1, -1, -1}, {1, 1, 1}, add_material(parts, lambert({0.5f, 0.6f, 0.5f})));
+    Material glossy;
+    glossy.kd = {0.2f, 0.3f, 0.1f};
+    glossy.ks = {0.3f, 0.3f, 0.3f};
+    glossy.roughness = 0.4f;
+    add_box(parts, {-0.6f, -0.99f, -0.8f}, {0.6f, -0.8f, 0.1f}, add_material(parts, glossy));
+    add_rectangle(parts, {0.3f, -1, -0.4f}, {0, 0, 0.8f}, {0, 2, 0},
+                  add_material(parts, lambert({0.4f, 0.4f, 0.4f})));
+    std::vector<LightSpec> lights{SkySpec{{1, 1, 1}},
+                                  SphereLightSpec{{-0.5f, 0.3f, -0.5f}, 0.05f, {20, 20, 20}}};
+    for (int i = 0; i < 24; ++i) {
+        const float x = -0.9f + 0.15f * float(i % 12), z = i < 12 ? -0.7f : 0.5f,
+                    radiance = x > 0.4f ? 300.0f : 10.0f;
+        const Vec3 u{0.04f, 0, 0}, v{0, 0, 0.05f};  // u x v points down.
+        lights.push_back(
+            QuadLightSpec{{x, 0.8f, z}, i % 2 ? u : v, i % 2 ? v : u, {radiance, radiance, radiance}});
+    }
+    return small_scene(std::move(parts), std::move(lights));
+}
+
 /// A ray of a small square picture of the room.
 inline Ray room_ray(int x, int y, int size, const PixelSampler& sampler) {
     const CameraFrame camera = make_camera({{0, 0, 0.95f}, {0, -0.1f, 0}, {0, 1, 0}, 80}, size, size);

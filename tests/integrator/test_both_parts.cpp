@@ -25,14 +25,16 @@ std::vector<TransportSettings> all_levers() {
     std::vector<TransportSettings> list;
     for (const Setting setting : {Setting::best, Setting::textbook})
         for (const MisHeuristic mis : {MisHeuristic::power, MisHeuristic::balance, MisHeuristic::off})
-            for (const int first_bounce : {0, 3})
-                for (const int max_bounces : {0, 1, 2}) {
-                    TransportSettings settings = make_settings(setting);
-                    settings.mis = mis;
-                    settings.roulette.first_bounce = first_bounce;
-                    settings.max_bounces = max_bounces;
-                    list.push_back(settings);
-                }
+            for (const auto& [roulette, name] : k_roulette_names)
+                for (const int first_bounce : {0, 3})
+                    for (const int max_bounces : {0, 1, 2}) {
+                        TransportSettings settings = make_settings(setting);
+                        settings.mis = mis;
+                        settings.roulette.kind = roulette;
+                        settings.roulette.first_bounce = first_bounce;
+                        settings.max_bounces = max_bounces;
+                        list.push_back(settings);
+                    }
     return list;
 }
 

@@ -136,7 +136,7 @@ TEST_CASE("every lever alone leaves the image as it is") {
     const Scene scene = small_room();
     const int size = 4, samples = k_sanitized ? 500 : 10'000;
     const auto best = room_picture(scene, make_settings(Setting::best), size, samples);
-    std::vector<TransportSettings> variants(7, make_settings(Setting::best));
+    std::vector<TransportSettings> variants(8, make_settings(Setting::best));
     variants[0].light = LightSampling::area;
     variants[1].hemisphere = HemisphereSampling::uniform;
     variants[2].hemisphere = HemisphereSampling::cosine;
@@ -144,13 +144,31 @@ TEST_CASE("every lever alone leaves the image as it is") {
     variants[4].mis = MisHeuristic::balance;
     variants[5].roulette.kind = Roulette::constant;
     variants[6].light_samples = 3;
+    variants[7].roulette.kind = Roulette::efficiency;
     for (std::size_t i = 0; i < variants.size(); ++i) {
         CAPTURE(i);
         CHECK(same_mean(room_picture(scene, variants[i], size, samples), best));
     }
 }
 
-TEST_CASE("the test above can fail: a light twice as bright, or a lost bounce, is another image") {
+TEST_CASE("in a room of many lamps the tree leaves the image as it is, and takes noise out of it") {
+    const Scene scene = room_of_lamps();
+    REQUIRE_FALSE(scene.lights.tree.empty());
+    const int size = 4, samples = k_sanitized ? 500 : 10'000;
+    TransportSettings by_tree = make_settings(Setting::best), by_power = by_tree;
+    by_power.light = LightSampling::power;
+    const auto tree = room_picture(scene, by_tree, size, samples),
+               power = room_picture(scene, by_power, size, samples);
+    CHECK(same_mean(tree, power));
+    double tree_variance = 0, power_variance = 0;
+    for (std::size_t i = 0; i < tree.size(); ++i) {
+        tree_variance += tree[i][0].standard_error() * tree[i][0].standard_error();
+        power_variance += power[i][0].standard_error() * power[i][0].standard_error();
+    }
+    CHECK(tree_variance < 0.8 * power_variance);
+}
+
+TEST_CASE("the tests above can fail: a light twice as bright, or a lost bounce, is another image") {
     const Scene scene = small_room();
     TransportSettings short_paths = make_settings(Setting::best);
     short_paths.max_bounces = 3;

@@ -13,7 +13,7 @@ using namespace pathscope::testing;
 
 namespace {
 
-constexpr LightSampling k_both[] = {LightSampling::area, LightSampling::power};
+constexpr LightSampling k_all[] = {LightSampling::area, LightSampling::power, LightSampling::tree};
 constexpr double k_pi64 = std::numbers::pi;
 constexpr Rgb k_white{1, 1, 1};
 
@@ -44,7 +44,7 @@ Moments estimate_irradiance(const Scene& scene, LightSampling sampling, const Su
 
 /// Within four standard errors (one failure in 16,000 for a correct program), and a hair for rounding.
 void check_irradiance(const Scene& scene, const SurfacePoint& at, double expected, int samples = 20'000) {
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         CAPTURE(name_of(sampling));
         const Moments found = estimate_irradiance(scene, sampling, at, samples);
         CAPTURE(found.mean());
@@ -159,7 +159,7 @@ TEST_CASE("irradiance: lights of all kinds add up, also where those at infinity 
     }
     expected = seen.mean() + 81.0 / 162 * dot(normalize(Vec3{-9, 9, 0}), normal) +
                2.0 * dot(normalize(Vec3{1, 0, 5}), normal);
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         const Moments found = estimate_irradiance(scene, sampling, at, 200'000);
         const double error = std::hypot(found.standard_error(), seen.standard_error());
         CHECK(error < 0.01 * expected);
@@ -178,7 +178,7 @@ TEST_CASE("what light sampling reports is what MIS computes for the same directi
                      SphereLightSpec{{-400, 50, 9}, 0.5f, {1e5f, 1e5f, 1e5f}}, SkySpec{{0.5f, 0.5f, 0.5f}},
                      SunSpec{{1, 0, 1}, k_white, 3}, EnvmapSpec{"test.hdr", 0.1f, 33}});
     const LightReference reference{{0.1f, -0.2f, 0.3f}, normalize(Vec3{1, 2, 1})};
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         HashRng rng(4);
         int compared = 0, differ = 0;
         for (int i = 0; i < 20'000; ++i) {
@@ -245,7 +245,7 @@ TEST_CASE("each light sampler draws directions with the density it reports") {
 
 TEST_CASE("a quad emits on the side of edge_u x edge_v only, and is black behind") {
     const Scene scene = small_scene({ceiling_light()});
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         CHECK(sample_light(scene, sampling, {{0, 0, 0}, {0, 1, 0}}, 0.3f, {0.5f, 0.5f}));
         CHECK_FALSE(sample_light(scene, sampling, {{0, 4, 0}, {0, -1, 0}}, 0.3f, {0.5f, 0.5f}));
         const auto behind = intersect(scene, {{0.2f, 4, 0}, {0, -1, 0}});
@@ -288,7 +288,7 @@ TEST_CASE("a textured emitter shines where its texture does, and through no hole
         // Below the border between the halves, each of them has the share of half the form factor. The
         // texture repeats, so at the outer border there is a ramp as well.
         const double expected = 2 * k_pi64 * 2 * corner_form_factor(1, 1.5, 2);
-        for (const LightSampling sampling : k_both) {
+        for (const LightSampling sampling : k_all) {
             const Moments found =
                 estimate_irradiance(scene, sampling, receiver({0, 0, 0}, {0, 1, 0}), 40'000);
             CHECK(found.mean() == doctest::Approx(expected).epsilon(0.02));
@@ -314,7 +314,7 @@ TEST_CASE("two copies of an emitter shine once, as a ray meets one of them only"
 
 TEST_CASE("from inside, a sphere is dark; a hair outside it is half the world") {
     const Scene scene = small_scene({SphereLightSpec{{0, 0, 0}, 2, k_white}});
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         for (int i = 0; i < 100; ++i)
             CHECK_FALSE(sample_light(scene, sampling, {{0, 1, 0}, {0, 1, 0}}, 0.5f,
                                      {0.005f + 0.01f * float(i), 0.37f}));
@@ -358,7 +358,7 @@ TEST_CASE("without lights there is no sample, no density, no crash, and one warn
     const Scene scene = small_scene({SkySpec{{0, 0, 0}}});
     REQUIRE(log.warnings.size() == 1);
     CHECK(log.warnings[0].find("black") != std::string::npos);
-    for (const LightSampling sampling : k_both) {
+    for (const LightSampling sampling : k_all) {
         CHECK_FALSE(sample_light(scene, sampling, {{0, 0, 0}, {0, 1, 0}}, 0.5f, {0.5f, 0.5f}));
         CHECK(sample_environment_pdf(scene, sampling, {{0, 0, 0}, {0, 1, 0}}, {0, 1, 0}) == 0);
     }

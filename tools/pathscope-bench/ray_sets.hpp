@@ -9,7 +9,7 @@
 ///
 /// Why five: packets win on the first kind by a factor of three and lose by as much on the third; a figure without the
 /// kind of its rays says nothing. Every surface is diffuse here: bounces are drawn by the cosine, on the side that the
-/// path came from. Lights are drawn as the renderer does by default, by power, a sky by the cosine; scenes without
+/// path came from. Lights are drawn by power, a sky by the cosine; scenes without
 /// emitting triangles thus send their shadow rays to sun and sky. Cut-outs are solid, and analytic spheres are
 /// left out, for all trees.
 ///

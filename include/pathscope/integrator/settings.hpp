@@ -3,7 +3,7 @@
 ///
 ///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
 ///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
-///   best:     light by power, two samples of it per vertex, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
+///   best:     light by a tree where there are many, else by power, two samples of it per vertex, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
 ///
 /// Why: both converge to the same image, so a lesson can ask what each lever buys.
 /// Thread safety: values.   Test: tests/integrator/test_settings.cpp
@@ -26,7 +26,7 @@ constexpr std::array k_setting_names{EnumName<Setting>{Setting::best, "best"},
 constexpr const auto& enum_table(Setting) { return k_setting_names; }
 
 struct TransportSettings {
-    LightSampling light = LightSampling::power;
+    LightSampling light = LightSampling::tree;
     int light_samples = 2;  ///< Per vertex, at least 1.
     HemisphereSampling hemisphere = HemisphereSampling::bsdf;
     MisHeuristic mis = MisHeuristic::power;

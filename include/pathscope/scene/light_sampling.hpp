@@ -29,12 +29,6 @@
 
 namespace pathscope {
 
-/// The point that is lit. The normal is the shading normal on the side of the viewer, of length one.
-struct LightReference {
-    Vec3 position;
-    Vec3 normal;
-};
-
 struct LightSample {
     Vec3 direction;  ///< From the reference to the light; length one.
     float distance = k_infinity;

@@ -4,13 +4,18 @@
 ///   Lr ≈ f Le cos θ / (P(light) pdf(direction | light))
 ///
 /// is one sample of the light that a point reflects. This header holds the lights and P(light); the densities
-/// of directions are in light_sampling.hpp. There are two ways to pick, for lessons to compare; both converge
+/// of directions are in light_sampling.hpp. There are three ways to pick, for lessons to compare; all converge
 /// to the same image:
 ///   area   the textbook: all emitting surface together is one light, sampled uniformly, pdf_area = 1 / A.
 ///          Lights without area (point, sun, sky, environment) get equal shares beside it: where there are k
 ///          of them each is picked with probability 1 / (k + 1), and the surface with the rest.
 ///   power  each light in proportion to the power that it sends out; light from infinity sends what falls on
 ///          the disc that just covers the scene.
+///   tree   each light by what it may send to the point at hand (light_tree.hpp). The lights at infinity stand beside
+///          the tree: half of the picks are shared equally, among k of them and the tree, and half in proportion to the
+///          irradiance that each would give without shadows. Equal shares alone waste samples on a faint sky,
+///          irradiance alone starves the lamps of a room from which the sun is shut out. Scenes with fewer finite
+///          lights than k_least_tree_lights have no tree, and pick by power.
 /// Units: radiance W/(m² sr), intensity W/sr, irradiance W/m², each as linear Rgb; powers are luminances.
 /// See: for area, Y. Huang, "A Distributed Path Tracer"; for power, Shirley, Wang & Zimmerman 1996, "Monte
 /// Carlo Techniques for Direct Lighting Calculations".
@@ -19,6 +24,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -26,13 +33,15 @@
 #include "pathscope/math/vec.hpp"
 #include "pathscope/sampling/distribution.hpp"
 #include "pathscope/scene/environment.hpp"
+#include "pathscope/scene/light_tree.hpp"
 
 namespace pathscope {
 
-enum class LightSampling : std::uint8_t { area, power };
+enum class LightSampling : std::uint8_t { area, power, tree };
 inline constexpr std::array k_light_sampling_names{
     EnumName{LightSampling::area, "area"},
     EnumName{LightSampling::power, "power"},
+    EnumName{LightSampling::tree, "tree"},
 };
 constexpr const auto& enum_table(LightSampling) { return k_light_sampling_names; }
 
@@ -103,7 +112,11 @@ struct LightTable {
     std::vector<std::uint32_t> of_triangle;  ///< Of each mesh triangle, or k_no_light; empty if none emits.
     std::vector<std::uint32_t> of_sphere;    ///< Of each of Scene::spheres.
     std::vector<std::uint32_t> infinite;     ///< Those that a ray may see which leaves the scene: no deltas.
-    std::array<Distribution1d, 2> pick;      ///< Over `lights`, by LightSampling; nothing without lights.
+    std::array<Distribution1d, 2> pick;      ///< Over `lights`, by area or power; nothing without lights.
+    LightTree tree;                          ///< Over the finite lights; empty where it would not pay.
+    std::vector<std::uint32_t> in_tree;      ///< The light of each of its bounds.
+    std::vector<std::uint32_t> of_tree;      ///< Of each light, its place in in_tree, or k_no_light.
+    std::vector<std::uint32_t> beside_tree;  ///< All lights at infinity, deltas too.
 
     [[nodiscard]] bool empty() const { return lights.empty(); }
 };
@@ -114,13 +127,31 @@ struct LightTable {
 /// The surface it emits from; 0 for lights that have none.
 [[nodiscard]] double light_area(const Light& light);
 
-/// Fills `infinite` and `pick`. Requires: the other members are filled, every light emits something.
-void finish_light_table(LightTable& table, float scene_radius);
+/// Fewer finite lights are better picked by power: the walk costs more than it gains.
+inline constexpr std::uint32_t k_least_tree_lights = 4;
 
-/// P(light). Requires: light < lights.size().
+/// Fills `infinite`, `pick` and the tree. bounds: of each light, or nothing for one at infinity.
+/// Requires: the other members are filled, every light emits something.
+void finish_light_table(LightTable& table, float scene_radius,
+                        std::span<const std::optional<LightBounds>> bounds);
+
+/// P(light) by area or power, which do not ask where the point is. Requires: light < lights.size().
 [[nodiscard]] inline float pick_probability(const LightTable& table, LightSampling sampling,
                                             std::uint32_t light) {
     return table.pick[std::size_t(sampling)].pmf(int(light));
 }
+
+struct LightPick {
+    std::uint32_t light = 0;
+    float probability = 0;  ///< > 0
+};
+
+/// Nothing if there is no light, or none that could reach the point. Requires: u in [0, 1).
+[[nodiscard]] std::optional<LightPick> pick_light(const LightTable& table, LightSampling sampling,
+                                                  const LightReference& reference, float u);
+
+/// P(light) at the point. Requires: light < lights.size().
+[[nodiscard]] float pick_probability(const LightTable& table, LightSampling sampling,
+                                     const LightReference& reference, std::uint32_t light);
 
 }  // namespace pathscope
