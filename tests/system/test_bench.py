@@ -98,6 +98,20 @@ class Bench(unittest.TestCase):
             self.assertLess(2 * row["rmse_after"], row["rmse_before"], row)
             self.assertLess(4 * row["rel_mse_after"], row["rel_mse_before"], row)
 
+    def test_limits(self):
+        """The program itself checks that the circle of loads goes through the whole working set."""
+        file = self.measure("limits")
+        self.assertIn(file["simd"], {"portable", "avx2", "avx512"})
+        rows = {limit: [row for row in file["rows"] if row["limit"] == limit] for limit in ("arithmetic", "bandwidth", "latency")}
+        self.assertEqual(sum(map(len, rows.values())), len(file["rows"]))
+        self.assertIn("portable", {row["simd"] for row in rows["arithmetic"]})
+        self.assertTrue(all(row["gflops"] > 0 for row in rows["arithmetic"]))
+        for limit, figure in (("bandwidth", "gb_per_s"), ("latency", "ns")):
+            sizes = [row["bytes"] for row in rows[limit]]
+            self.assertEqual(sizes, [32768 * 4**i for i in range(8)])
+            self.assertTrue(all(row[figure] > 0 for row in rows[limit]))
+        self.assertLess(rows["latency"][0]["ns"], rows["latency"][-1]["ns"])  # By a factor of fifty, usually.
+
     def test_ledger(self):
         # The program itself checks that every tile was committed once.
         rows = self.measure("ledger")["rows"]

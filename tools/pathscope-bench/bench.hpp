@@ -49,6 +49,7 @@ struct Bench {
 [[nodiscard]] Result<Report> bench_filter(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_image(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_ledger(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_limits(const BenchOptions& options);
 
 /// {"bench", "machine", "commit", "version", "runs", "rows", ...}, as docs/performance.md explains them.
 [[nodiscard]] std::string report_json(const BenchOptions& options, const Report& report);

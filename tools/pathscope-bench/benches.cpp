@@ -17,6 +17,7 @@ const std::vector<Bench>& bench_table() {
          {"--threads", "--size", "--scenes", "--scene", "--spp", "--reference-spp"},
          bench_filter},
         {"ledger", "tiles per second through ledger and schedule", {}, bench_ledger},
+        {"limits", "what a core can do at most: arithmetic, bandwidth, latency", {}, bench_limits},
     };
     return table;
 }
