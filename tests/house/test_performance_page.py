@@ -316,6 +316,12 @@ class Page(unittest.TestCase):
             self.assertEqual((done.returncode, len(done.stderr.strip().splitlines())), (2, 1), done.stderr)
             self.assertIn(named, done.stderr)
 
+    def test_instructions_before_and_after(self):
+        rows = [{"scene": "box", "rays": "shadow", "ours": ours, "instructions_per_ray": count} for ours, count in (("two-wide", 1000.0), ("wide", 250.4))]
+        done = self.write({**FILE, "bench": "instructions", "peer": "valgrind-3.19.0", "simd": "avx2", "rows": rows})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("| box | shadow | 1,000 | 250 | 0.25 |", self.page.read_text(encoding="utf-8"))
+
     def test_refused_in_one_sentence_and_nothing_written(self):
         before = self.page.read_bytes()
         good, old = image_file(Pictures.SCENES), image_file(Pictures.SCENES)
