@@ -255,7 +255,15 @@ class Floors(unittest.TestCase):
     def test_a_larger_tree_pays_what_its_memory_costs(self):
         for triangles in (1000, 1_000_000):  # Fits the second size; fits none, and the last one counts.
             time, = limit_figures.ray_times([self.row(triangles)], limits_file())
-            self.assertEqual((time.floors, time.largest), ((9.44, 104, 240), "dependent loads"))
+            self.assertEqual((time.floors, time.measured), ((9.44, 104, 240), 200))
+            self.assertEqual((time.largest, time.times_above), ("bandwidth", 200 / 104))  # 240 ns are refuted by 200.
+            slow, = limit_figures.ray_times([self.row(triangles, our_calls={"closest_hit": 2.0})], limits_file())
+            self.assertEqual((slow.largest, slow.times_above), ("dependent loads", 500 / 240))
+
+    def test_a_time_below_all_floors(self):
+        time, = limit_figures.ray_times([self.row(our_calls={"closest_hit": 1000.0})], limits_file())
+        self.assertEqual((time.largest, time.times_above), ("none", None))
+        self.assertIn("1 to 1 times", limit_figures.picture([time]).alt)
 
     def test_single_rays_of_the_wide_tree_on_the_first_number_of_threads(self):
         rows = [self.row(), self.row(ours="two-wide"), self.row(threads=2), self.row(nodes_per_ray=None, boxes_per_ray=None),
@@ -269,8 +277,8 @@ class Floors(unittest.TestCase):
         x = [places[f"box, shadow: {what} ns"][0] for what in ("dependent loads 6", "arithmetic 9.44", "bandwidth 13", "measured 200")]
         self.assertEqual(x, sorted(x))
         self.assertAlmostEqual(x[3], places["box, primary: measured 200 ns"][0])
-        self.assertIn("arithmetic for 0, bandwidth for 1, dependent loads for 1 of 2", picture.alt)
-        self.assertIn("0.83 to 15 times", picture.alt)
+        self.assertIn("arithmetic for 0, bandwidth for 2, dependent loads for 0 of 2", picture.alt)
+        self.assertIn("1.9 to 15 times", picture.alt)
 
 
 class Page(unittest.TestCase):
@@ -311,6 +319,9 @@ class Page(unittest.TestCase):
         self.assertIn("(images/bvh-limits.svg)", page)
         self.assertIn("| latency | 128 KiB | 80.0 ns |", page)
         self.assertIn("| box | shadow | 200 |", page)
+        large = bvh_file([{**bvh_row("box", "shadow", "wide", 5, 3, None), "triangles": 1000}])
+        self.assertEqual(self.write(limits_file(), large).returncode, 0)
+        self.assertIn("| (240) | bandwidth |", self.page.read_text(encoding="utf-8"))
         for files, named in (([limits_file()], "file of bvh"), ([limits_file(), {**bvh, "machine": "another"}], "another")):
             done = self.write(*files)
             self.assertEqual((done.returncode, len(done.stderr.strip().splitlines())), (2, 1), done.stderr)

@@ -25,12 +25,17 @@ class RayTime(NamedTuple):
     floors: tuple
 
     @property
+    def held(self):
+        """The floors that the time measured did not refute by being below them, by name."""
+        return {name: floor for name, floor in zip(FLOORS, self.floors) if floor <= self.measured}
+
+    @property
     def largest(self):
-        return FLOORS[self.floors.index(max(self.floors))]
+        return max(self.held, key=self.held.get, default="none")
 
     @property
     def times_above(self):
-        return self.measured / max(self.floors)
+        return self.measured / max(self.held.values()) if self.held else None
 
 
 class Limits:
@@ -70,7 +75,7 @@ def draw(times, description):
     bottom = TOP + len(times) * ROW_HEIGHT + len(scenes) * SCENE_GAP
     canvas = Canvas(bottom + 46)
     panel = Panel(canvas, NAME_WIDTH, 40, WIDTH - NAME_WIDTH - 24, bottom - 40, axis_around(values, max(1.0, decades(values))))
-    panel.draw_axes("", "ns per ray (logarithmic); the bar goes from the largest floor to what was measured")
+    panel.draw_axes("", "ns per ray (logarithmic); the bar goes from the largest floor that holds to what was measured")
     for i, (floor, look) in enumerate(zip(FLOORS, LOOKS[1:])):
         canvas.marker(NAME_WIDTH + 160 * i, 18, look, floor)
         canvas.text(NAME_WIDTH + 160 * i + 10, 22, floor, look.colour, bold=True)
@@ -82,7 +87,7 @@ def draw(times, description):
         for time in [time for time in times if time.scene == scene]:
             y += ROW_HEIGHT
             canvas.text(NAME_WIDTH - 10, y + 4, time.kind, SOFT, 11, "end")
-            canvas.line([(panel.x(max(time.floors)), y), (panel.x(time.measured), y)], SOFT, 1.5)
+            canvas.line([(panel.x(max(time.held.values(), default=time.measured)), y), (panel.x(time.measured), y)], SOFT, 1.5)
             for floor, value, look in [*zip(FLOORS, time.floors, LOOKS[1:]), ("measured", time.measured, LOOKS[0])]:
                 canvas.marker(panel.x(value), y, look, f"{time.scene}, {time.kind}: {floor} {value:.3g} ns")
         y += SCENE_GAP
@@ -90,8 +95,8 @@ def draw(times, description):
 
 
 def picture(times):
-    above = [time.times_above for time in times]
+    above = [time.times_above for time in times if time.held] or [1]
     counts = ", ".join(f"{floor} for {sum(time.largest == floor for time in times)}" for floor in FLOORS)
     alt = (f"Nanoseconds per ray of the wide tree, and the floors under them by arithmetic, bandwidth and dependent loads, for each scene and kind of "
-           f"rays. The largest floor is {counts} of {len(times)}; what was measured is {min(above):.2g} to {max(above):.2g} times the largest floor.")
+           f"rays. The largest floor that the time measured does not refute is {counts} of {len(times)}; the time is {min(above):.2g} to {max(above):.2g} times that floor.")
     return Picture("bvh-limits.svg", draw(times, alt), alt)
