@@ -24,11 +24,10 @@ inline namespace PATHSCOPE_SIMD {
         number(0x1.8p23f);  // Adding it leaves no bits for a fraction: n lies in the last bits.
     const Floats shifted = round - d;
     const Floats g = d + (shifted - round);
-    const Floats p =
-        number(-0.693147182f) +
-        g * (number(0.240223497f) +
-             g * (number(-0.0555038117f) + g * (number(0.00966636837f) + g * number(-0.00133813021f))));
-    return times_power_of_two(number(1) + g * p, shifted);
+    Floats p = number(-0.00133813021f);
+    for (const float next : {0.00966636837f, -0.0555038117f, 0.240223497f, -0.693147182f})
+        p = fused(g, p, number(next));
+    return times_power_of_two(fused(g, p, number(1)), shifted);
 }
 
 }  // namespace PATHSCOPE_SIMD

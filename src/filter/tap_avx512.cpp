@@ -12,6 +12,7 @@
 #include <span>
 
 #include "filter/tap_kernels.hpp"
+#include "pathscope/math/fused.hpp"
 #include "pathscope/math/simd_level.hpp"
 
 #pragma GCC target("avx2,fma,bmi,avx512f,avx512vl")

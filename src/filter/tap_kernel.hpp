@@ -17,7 +17,7 @@ template <std::size_t planes>
                                         const float* other, std::size_t stride) {
     for (std::size_t k = 0; k < planes; ++k) {
         const Floats difference = load_floats(other + k * stride) - own[k];
-        distance = distance + difference * difference;
+        distance = fused(difference, difference, distance);
     }
     return distance;
 }
@@ -46,11 +46,11 @@ inline void sum_taps_at(const StripPlanes& planes, std::span<const Tap> taps, fl
         Floats distance =
             add_squares(broadcast_floats(tap.exponent), own_guides, guides + tap.offset, planes.stride);
         if constexpr (compare == Compare::guides_and_colour)
-            distance = distance + scale * add_squares(zero, own_colours, other_colours, planes.stride);
+            distance = fused(scale, add_squares(zero, own_colours, other_colours, planes.stride), distance);
         const Floats w = exp2_negative(distance);
         weight = weight + w;
         for (std::size_t k = 0; k < k_colour_planes; ++k)
-            colour[k] = colour[k] + w * load_floats(other_colours + k * planes.stride);
+            colour[k] = fused(w, load_floats(other_colours + k * planes.stride), colour[k]);
     }
     store_floats(&sums.weight[i], weight);
     for (std::size_t k = 0; k < k_colour_planes; ++k) store_floats(&sums.colour[k][i], colour[k]);

@@ -1,6 +1,7 @@
 #include "pathscope/render/rendered_frame.hpp"
 
 #include "pathscope/core/parallel_for.hpp"
+#include "pathscope/render/indirect_filter.hpp"
 #include "pathscope/render/round_renderer.hpp"
 #include "pathscope/render/tile_filter.hpp"
 
@@ -22,7 +23,7 @@ RenderedFrame compose_frame(const FrameSums& direct, const FrameSums& indirect,
     frame.direct = direct.mean();
     frame.unfiltered = indirect.mean();
     frame.indirect = settings.filter == FilterPlace::client
-                         ? joint_bilateral(frame.unfiltered, guides, settings.bilateral, threads)
+                         ? filter_indirect(frame.unfiltered, guides, settings, threads)
                          : frame.unfiltered;
     frame.combined = frame.direct;
     for (std::size_t i = 0; i < frame.combined.pixels.size(); ++i)

@@ -1,5 +1,7 @@
 #include "pathscope/render/tile_filter.hpp"
 
+#include "pathscope/render/indirect_filter.hpp"
+
 namespace pathscope {
 
 std::vector<PixelSum> filter_tile(const Scene& scene, const Camera& camera, const RenderSettings& settings,
@@ -10,7 +12,7 @@ std::vector<PixelSum> filter_tile(const Scene& scene, const Camera& camera, cons
         noisy.pixels[i] = mean(sums[i], round.count, settings.quantum);
 
     const Guides guides = render_guides(scene, camera, settings, round.rect, threads);
-    const Image filtered = joint_bilateral(noisy, guides, settings.bilateral, threads);
+    const Image filtered = filter_indirect(noisy, guides, settings, threads);
 
     std::vector<PixelSum> result(sums.size());
     bool saturated = false;  // Clamped only if demodulation by a dark albedo lifts a mean beyond the range.

@@ -14,6 +14,7 @@ constexpr std::array<std::string_view, 19> k_keys{
     "scene",   "files",      "material", "smoothing", "texel_space",   "camera",     "size",
     "spp",     "direct_spp", "seed",     "light",     "light_samples", "hemisphere", "mis",
     "sampler", "roulette",   "bounces",  "filter",    "quantum"};
+constexpr std::array<std::string_view, 4> k_filter_keys{"place", "kind", "joint", "atrous"};
 
 PackValue pack_vec(Vec3 v) { return PackArray{double(v.x), double(v.y), double(v.z)}; }
 
@@ -82,34 +83,72 @@ RouletteParams decode_roulette(FieldReader& state) {
 /// A sigma of 0 stands for infinity: MessagePack headers carry finite numbers only.
 double finite_sigma(float sigma) { return std::isinf(sigma) ? 0.0 : double(sigma); }
 
-PackMap encode_filter(FilterPlace place, const BilateralParams& params) {
-    PackMap map;
-    map.set("place", name_of(place));
-    map.set("radius", params.radius);
-    map.set("sigma_spatial", finite_sigma(params.sigma_spatial));
+/// What both filters have: the sigmas of the guides.
+template <class Params>
+void encode_guide_use(PackMap& map, const Params& params) {
     map.set("sigma_normal", finite_sigma(params.sigma_normal));
     map.set("sigma_depth", finite_sigma(params.sigma_depth));
     map.set("sigma_albedo", finite_sigma(params.sigma_albedo));
     map.set("demodulate_albedo", params.demodulate_albedo);
+}
+
+PackMap encode_joint(const BilateralParams& params) {
+    PackMap map;
+    map.set("radius", params.radius);
+    map.set("sigma_spatial", finite_sigma(params.sigma_spatial));
+    encode_guide_use(map, params);
     return map;
+}
+
+PackMap encode_atrous(const AtrousParams& params) {
+    PackMap map;
+    map.set("levels", params.levels);
+    map.set("sigma_colour", finite_sigma(params.sigma_colour));
+    encode_guide_use(map, params);
+    return map;
+}
+
+PackMap encode_filter(const RenderSettings& settings) {
+    PackMap map;
+    map.set("place", name_of(settings.filter));
+    map.set("kind", name_of(settings.filter_kind));
+    map.set("joint", encode_joint(settings.bilateral));
+    map.set("atrous", encode_atrous(settings.atrous));
+    return map;
+}
+
+float read_sigma(FieldReader& fields, std::string_view name) {
+    const float value = read_float(fields, name, 0, 1e9f);
+    return value == 0 ? k_infinity : value;
+}
+
+/// The map `name` of the filter: `read_own` reads what this kind alone has.
+template <class Params, class ReadOwn>
+void decode_params(FieldReader& filter, const char* name, Params& params, ReadOwn&& read_own) {
+    FieldReader fields(filter.map(name), name);
+    read_own(fields);
+    params.sigma_normal = read_sigma(fields, "sigma_normal");
+    params.sigma_depth = read_sigma(fields, "sigma_depth");
+    params.sigma_albedo = read_sigma(fields, "sigma_albedo");
+    params.demodulate_albedo = fields.boolean("demodulate_albedo");
+    if (fields.error()) return filter.fail(name, "is wrong: " + fields.error()->message);
+    if (const auto ok = check_params(params); !ok) filter.fail(name, "is wrong: " + ok.error().message);
 }
 
 void decode_filter(FieldReader& state, RenderSettings& settings) {
     FieldReader fields(state.map("filter"), "filter");
-    const auto sigma = [&](std::string_view name) {
-        const float value = read_float(fields, name, 0, 1e9f);
-        return value == 0 ? k_infinity : value;
-    };
+    fields.only(k_filter_keys);
     settings.filter = fields.enumerator<FilterPlace>("place");
-    BilateralParams& params = settings.bilateral;
-    params.radius = int(fields.u32("radius", 0, k_max_filter_radius));
-    params.sigma_spatial = sigma("sigma_spatial");
-    params.sigma_normal = sigma("sigma_normal");
-    params.sigma_depth = sigma("sigma_depth");
-    params.sigma_albedo = sigma("sigma_albedo");
-    params.demodulate_albedo = fields.boolean("demodulate_albedo");
-    if (fields.error()) return state.fail("filter", "is wrong: " + fields.error()->message);
-    if (const auto ok = check_params(params); !ok) state.fail("filter", "is wrong: " + ok.error().message);
+    settings.filter_kind = fields.enumerator<FilterKind>("kind");
+    decode_params(fields, "joint", settings.bilateral, [&](FieldReader& joint) {
+        settings.bilateral.radius = int(joint.u32("radius", 0, k_max_filter_radius));
+        settings.bilateral.sigma_spatial = read_sigma(joint, "sigma_spatial");
+    });
+    decode_params(fields, "atrous", settings.atrous, [&](FieldReader& wavelet) {
+        settings.atrous.levels = int(wavelet.u32("levels", 0, k_max_atrous_levels));
+        settings.atrous.sigma_colour = read_sigma(wavelet, "sigma_colour");
+    });
+    if (fields.error()) state.fail("filter", "is wrong: " + fields.error()->message);
 }
 
 void decode_size(FieldReader& state, RenderSettings& settings) {
@@ -167,7 +206,7 @@ PackMap encode_state(const RenderState& state) {
     map.set("sampler", name_of(transport.sampler));
     map.set("roulette", encode_roulette(transport.roulette));
     map.set("bounces", transport.max_bounces);
-    map.set("filter", encode_filter(settings.filter, settings.bilateral));
+    map.set("filter", encode_filter(settings));
     map.set("quantum", settings.quantum.exponent);
     return map;
 }

@@ -82,33 +82,6 @@ TEST_CASE("accept is honoured: holes are seen through") {
     CHECK_FALSE(any_hit(build_bvh(mesh), {{-1, 0.5f, 0.5f}, {1, 0, 0}}, nothing));
 }
 
-TEST_CASE("of coincident triangles the lowest number counts, whatever the tree") {
-    Mesh mesh;
-    for (int i = 0; i < 40; ++i) add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-    for (const BvhSplit split : {BvhSplit::sah, BvhSplit::median}) {
-        const Bvh bvh = build_bvh(mesh, {.split = split, .max_leaf_triangles = 1});
-        CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}})->triangle == 0);
-        CHECK(closest_hit(bvh, {{0.2f, 0.7f, 1}, {0, 0, -1}})->triangle == 1);
-        CHECK(closest_hit(bvh, {{0.5f, 0.5f, 1}, {0, 0, -1}})->triangle == 0);  // on the diagonal: both
-        const auto not_the_first = [](std::uint32_t triangle, float, float) { return triangle > 4; };
-        CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}}, not_the_first)->triangle == 6);
-    }
-}
-
-TEST_CASE("an empty mesh, an empty interval, and directions that are none meet nothing") {
-    const Bvh empty = build_bvh(Mesh{});
-    CHECK_FALSE(closest_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
-    CHECK_FALSE(any_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
-
-    const Bvh sphere = build_bvh(bumpy_sphere(3, 2));
-    CHECK(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
-    CHECK_FALSE(closest_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 0}}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, std::nanf(""), 1}}));
-    CHECK_FALSE(closest_hit(sphere, {{std::nanf(""), 0, 0}, {0, 0, 1}}));
-}
-
 TEST_CASE("no light leaks out of a closed mesh: rays at its edges and vertices always hit") {
     const int rays = k_sanitized ? 4000 : 40000;
     const Mesh shape = bumpy_sphere(5, 7);

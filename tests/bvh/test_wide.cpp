@@ -216,31 +216,6 @@ TEST_CASE("packets lose no hit at corners and edges, near or far, large or small
         }
 }
 
-TEST_CASE("of coincident triangles the lowest number counts") {
-    Mesh mesh;
-    for (int i = 0; i < 40; ++i) add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-    const WideBvh bvh = build_wide_bvh(mesh);
-    CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}})->triangle == 0);
-    CHECK(closest_hit(bvh, {{0.2f, 0.7f, 1}, {0, 0, -1}})->triangle == 1);
-    CHECK(closest_hit(bvh, {{0.5f, 0.5f, 1}, {0, 0, -1}})->triangle == 0);  // On the diagonal: both.
-    const auto not_the_first = [](std::uint32_t triangle, float, float) { return triangle > 4; };
-    CHECK(closest_hit(bvh, {{0.7f, 0.2f, 1}, {0, 0, -1}}, not_the_first)->triangle == 6);
-}
-
-TEST_CASE("an empty mesh, an empty interval, and directions that are none meet nothing") {
-    const WideBvh empty = build_wide_bvh(Mesh{});
-    CHECK_FALSE(closest_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
-    CHECK_FALSE(any_hit(empty, {{0, 0, 0}, {0, 0, 1}}));
-
-    const WideBvh sphere = build_wide_bvh(bumpy_sphere(3, 2));
-    CHECK(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
-    CHECK_FALSE(closest_hit(sphere, {{0, 0, 0}, {0, 0, 1}, 0, -1}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, 0, 0}}));
-    CHECK_FALSE(any_hit(sphere, {{0, 0, 0}, {0, std::nanf(""), 1}}));
-    CHECK_FALSE(closest_hit(sphere, {{std::nanf(""), 0, 0}, {0, 0, 1}}));
-}
-
 TEST_CASE("the tree is the same, byte for byte, for any number of threads") {
     const Mesh mesh = needles(20000, 8);  // More than one subtree.
     const WideBvh one = build_wide_bvh(mesh, {}, 1);

@@ -18,7 +18,7 @@ PROJECT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(PROJECT / "tools"))
 sys.dont_write_bytecode = True
 
-from performance import bvh_figures, image_figures, plot  # noqa: E402
+from performance import bvh_figures, image_figures, limit_figures, plot  # noqa: E402
 from performance.equal_error import Need, common_error, need, ratio  # noqa: E402
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -47,12 +47,20 @@ def bvh_row(scene, kind, ours, mrays_per_s, nodes, ratios):
     embree = (lambda value: value if ratios else None)
     return {"scene": scene, "triangles": 38, "rays": kind, "threads": 1, "ours": ours, "mrays_per_s": mrays_per_s,
             "ratio_min": low, "ratio_vs_embree": middle, "ratio_max": high, "build_s": 1.0, "embree_build_s": embree(1.0),
-            "bytes_per_triangle": 70.0, "embree_bytes_per_triangle": embree(70.0), "nodes_per_ray": nodes, "boxes_per_ray": nodes,
+            "our_calls": {"closest_hit": mrays_per_s}, "bytes_per_triangle": 70.0, "embree_bytes_per_triangle": embree(70.0), "nodes_per_ray": nodes, "boxes_per_ray": nodes,
             "triangles_per_ray": 1.0}
 
 
 def bvh_file(rows, peer="embree 3.13.5"):
     return {**FILE, "bench": "bvh", "peer": peer, "summary": [], "rows": rows}
+
+
+def limits_file(gflops=100.0, gb_per_s=(64.0, 8.0), ns=(2.0, 80.0)):
+    """A machine whose first cache holds 32 KiB, and whose memory is slow."""
+    rows = [{"limit": "arithmetic", "simd": "portable", "gflops": 1.0}, {"limit": "arithmetic", "simd": "avx2", "gflops": gflops}]
+    for i, size in enumerate((32768, 131072)):
+        rows += [{"limit": "bandwidth", "bytes": size, "gb_per_s": gb_per_s[i]}, {"limit": "latency", "bytes": size, "ns": ns[i]}]
+    return {**FILE, "bench": "limits", "simd": "avx2", "rows": rows}
 
 
 class EqualError(unittest.TestCase):
@@ -234,6 +242,45 @@ class Pictures(unittest.TestCase):
         self.assertEqual([picture.name for picture in drawn], ["bvh-steps.svg"])
 
 
+class Floors(unittest.TestCase):
+    def row(self, triangles=38, **changes):
+        return {**bvh_row("box", "shadow", "wide", 5, 3, None), "triangles": triangles, "boxes_per_ray": 16.0, "triangles_per_ray": 8.0, **changes}
+
+    def test_by_hand(self):
+        """16 boxes are two nodes, 8 triangles one block: 944 operations, 832 bytes and three loads. 38 * 70 bytes fit 32 KiB."""
+        time, = limit_figures.ray_times([self.row()], limits_file())
+        self.assertEqual((time.measured, time.floors), (200, (9.44, 13, 6)))
+        self.assertEqual((time.largest, round(time.times_above, 3)), ("bandwidth", round(200 / 13, 3)))
+
+    def test_a_larger_tree_pays_what_its_memory_costs(self):
+        for triangles in (1000, 1_000_000):  # Fits the second size; fits none, and the last one counts.
+            time, = limit_figures.ray_times([self.row(triangles)], limits_file())
+            self.assertEqual((time.floors, time.measured), ((9.44, 104, 240), 200))
+            self.assertEqual((time.largest, time.times_above), ("bandwidth", 200 / 104))  # 240 ns are refuted by 200.
+            slow, = limit_figures.ray_times([self.row(triangles, our_calls={"closest_hit": 2.0})], limits_file())
+            self.assertEqual((slow.largest, slow.times_above), ("dependent loads", 500 / 240))
+
+    def test_a_time_below_all_floors(self):
+        time, = limit_figures.ray_times([self.row(our_calls={"closest_hit": 1000.0})], limits_file())
+        self.assertEqual((time.largest, time.times_above), ("none", None))
+        self.assertIn("1 to 1 times", limit_figures.picture([time]).alt)
+
+    def test_single_rays_of_the_wide_tree_on_the_first_number_of_threads(self):
+        rows = [self.row(), self.row(ours="two-wide"), self.row(threads=2), self.row(nodes_per_ray=None, boxes_per_ray=None),
+                self.row(rays="primary", our_calls={"closest_hit": 4.0, "closest_hits": 16.0}, mrays_per_s=16.0)]
+        self.assertEqual([(time.kind, time.measured) for time in limit_figures.ray_times(rows, limits_file())], [("shadow", 200), ("primary", 250)])
+
+    def test_picture(self):
+        times = limit_figures.ray_times([self.row(), self.row(rays="primary", triangles=1000)], limits_file())
+        picture = limit_figures.picture(times)
+        places = markers(picture)
+        x = [places[f"box, shadow: {what} ns"][0] for what in ("dependent loads 6", "arithmetic 9.44", "bandwidth 13", "measured 200")]
+        self.assertEqual(x, sorted(x))
+        self.assertAlmostEqual(x[3], places["box, primary: measured 200 ns"][0])
+        self.assertIn("arithmetic for 0, bandwidth for 2, dependent loads for 0 of 2", picture.alt)
+        self.assertIn("1.9 to 15 times", picture.alt)
+
+
 class Page(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="pathscope_page_")
@@ -263,6 +310,28 @@ class Page(unittest.TestCase):
         self.assertIn("| box & <ball> | 0.25 | 16.0 | 4.0 | 0.25 | 4 | 1 | 0.25 |", after)
         sections = re.compile(r"(<!-- figures: (?:bvh|image) -->\n).*?(<!-- end -->)", re.DOTALL)
         self.assertEqual(sections.sub(r"\1\2", after), sections.sub(r"\1\2", before))
+
+    def test_limits_beside_the_rays_that_they_bound(self):
+        bvh = bvh_file([bvh_row("box", "shadow", "wide", 5, 3, None)])
+        done = self.write(limits_file(), bvh)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        page = self.page.read_text(encoding="utf-8")
+        self.assertIn("(images/bvh-limits.svg)", page)
+        self.assertIn("| latency | 128 KiB | 80.0 ns |", page)
+        self.assertIn("| box | shadow | 200 |", page)
+        large = bvh_file([{**bvh_row("box", "shadow", "wide", 5, 3, None), "triangles": 1000}])
+        self.assertEqual(self.write(limits_file(), large).returncode, 0)
+        self.assertIn("| (240) | bandwidth |", self.page.read_text(encoding="utf-8"))
+        for files, named in (([limits_file()], "file of bvh"), ([limits_file(), {**bvh, "machine": "another"}], "another")):
+            done = self.write(*files)
+            self.assertEqual((done.returncode, len(done.stderr.strip().splitlines())), (2, 1), done.stderr)
+            self.assertIn(named, done.stderr)
+
+    def test_instructions_before_and_after(self):
+        rows = [{"scene": "box", "rays": "shadow", "ours": ours, "instructions_per_ray": count} for ours, count in (("two-wide", 1000.0), ("wide", 250.4))]
+        done = self.write({**FILE, "bench": "instructions", "peer": "valgrind-3.19.0", "simd": "avx2", "rows": rows})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("| box | shadow | 1,000 | 250 | 0.25 |", self.page.read_text(encoding="utf-8"))
 
     def test_refused_in_one_sentence_and_nothing_written(self):
         before = self.page.read_bytes()

@@ -59,6 +59,8 @@ TEST_CASE("combined is direct + indirect") {
 TEST_CASE("the client's filter blurs indirect light alone, and stops at edges of the guides") {
     RenderSettings settings;
     settings.filter = FilterPlace::client;
+    SUBCASE("joint") {}
+    SUBCASE("atrous") { settings.filter_kind = FilterKind::atrous; }
     const FrameSums direct = two_blocks(0, 1), indirect = two_blocks(0, 1);
 
     const RenderedFrame flat = compose_frame(direct, indirect, settings, wall_with_step(1), 2);

@@ -55,6 +55,24 @@ TEST_CASE("a constant tile stays, for any radius, to a float's last bits") {
     }
 }
 
+TEST_CASE("a tile is filtered by the kind that is asked for, and a-trous of no levels leaves it as it is") {
+    const Scene scene = small_room();
+    RenderSettings settings = small_settings(scene);
+    const Round round{0, {0, 0, 12, 8}, 0, 2};
+    const RoundResult noisy = *render_round(scene, room_camera(), settings, LightPart::indirect, round, 2);
+    const auto filter = [&] { return filter_tile(scene, room_camera(), settings, round, noisy.sums, 2); };
+    const std::vector<PixelSum> joint = filter();
+    settings.filter_kind = FilterKind::atrous;
+    const std::vector<PixelSum> wavelet = filter();
+    CHECK(wavelet != joint);
+    CHECK(roughness(wavelet, 12) < roughness(noisy.sums, 12));
+    settings.atrous.levels = 0;
+    const std::vector<PixelSum> none = filter();
+    settings.filter_kind = FilterKind::joint;
+    settings.bilateral.radius = 0;
+    CHECK(filter() == none);
+}
+
 TEST_CASE("the filter smooths noise, the same for any threads") {
     const Scene scene = two_panels();  // Flat: guides differ by the depth alone.
     RenderSettings settings = small_settings(scene);

@@ -1,63 +1,23 @@
+#include "pathscope/scene/load.hpp"
+
 #include <algorithm>
 #include <fstream>
 #include <map>
 #include <string>
 
 #include "pathscope/core/files.hpp"
-#include "pathscope/core/log.hpp"
 #include "pathscope/image/io.hpp"
-#include "pathscope/scene/load.hpp"
 
 #include "memory_files.hpp"
 #include "testing.hpp"
 
-#include "scene/same_parts.hpp"
+#include "scene/loading.hpp"
 
 using namespace pathscope;
+using namespace pathscope::testing;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// All that is said while it lives.
-class Listener {
-  public:
-    Listener() {
-        before_ = set_log_sink([this](LogLevel level, std::string_view sentence) {
-            said.push_back((level == LogLevel::warning ? "warning: " : "note: ") + std::string(sentence));
-        });
-    }
-    ~Listener() { set_log_sink(before_); }
-    Listener(const Listener&) = delete;
-    Listener& operator=(const Listener&) = delete;
-
-    [[nodiscard]] int count(std::string_view part) const {
-        return int(std::count_if(said.begin(), said.end(),
-                                 [part](const auto& s) { return s.find(part) != std::string::npos; }));
-    }
-    std::vector<std::string> said;
-
-  private:
-    LogSink before_;
-};
-
-SceneFile scene_of(std::vector<std::string> objs) {
-    SceneFile scene;
-    scene.objs = std::move(objs);
-    return scene;
-}
-
-SceneParts parts_of(const SceneFile& scene, FileSource& files, const SceneOptions& options = {}) {
-    auto parts = load_scene_parts(scene, files, options);
-    REQUIRE_MESSAGE(parts, (parts ? "" : parts.error().message));
-    return std::move(*parts);
-}
-
-std::string error_of(const SceneFile& scene, FileSource& files) {
-    const auto parts = load_scene_parts(scene, files, {});
-    return parts ? "(no error)" : parts.error().message;
-}
-
-std::string triangle(const std::string& head = "") { return head + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"; }
 
 /// The one material of a triangle whose MTL has these statements.
 Material material_of(const std::string& statements, const SceneOptions& options = {},
@@ -70,21 +30,6 @@ Material material_of(const std::string& statements, const SceneOptions& options 
     const SceneParts parts = parts_of(scene, files, options);
     REQUIRE(parts.materials.size() == 1);
     return parts.materials[0];
-}
-
-/// A TGA of one pixel (blue, green, red, alpha), the smallest image file there is.
-std::string tga(std::vector<std::uint8_t> bgra) {
-    std::string bytes(18, '\0');
-    bytes[2] = 2;
-    bytes[12] = bytes[14] = 1;
-    bytes[16] = char(8 * bgra.size());
-    bytes.append(bgra.begin(), bgra.end());
-    return bytes;
-}
-
-void write(const fs::path& path, std::string_view bytes) {
-    fs::create_directories(path.parent_path());
-    REQUIRE(write_file_atomically(path, bytes));
 }
 
 }  // namespace
@@ -341,164 +286,4 @@ TEST_CASE("what is wrong with a file of a scene is named with its path") {
     write(folder.path() / "b.mtl", "newmtl m\nKd x\n");
     CHECK(error_of(scene_of({"b.obj"}), files) ==
           (folder.path() / "b.mtl").string() + ":2: Kd needs a number, and \"x\" is none.");
-}
-
-TEST_CASE("a scene loads into the same bits from a folder and from a manifest") {
-    const testing::TemporaryFolder folder, cache;
-    write(folder.path() / "room.obj",
-          "mtllib Room Parts.MTL\n" + triangle("vt 0.1 0.2\nusemtl m\ns 1\n") + "f 1/1 2/1 3/1\n");
-    write(folder.path() / "room parts.mtl",
-          "newmtl m\nKd 0.3 0.3 0.3\nmap_Kd Maps\\RED.tga\nmap_Ks none.png\nKe 1 2 3\n");
-    write(folder.path() / "maps" / "red.TGA", tga({1, 2, 200, 50}));
-    write(folder.path() / "unrelated.txt", "private");
-    const Listener quiet;
-    const auto opened = open_scene(folder.path() / "room.obj", {});
-    REQUIRE(opened);
-
-    const Manifest manifest = opened->files->manifest();
-    CHECK(manifest.files.size() == 3);
-    CHECK(manifest.missing == std::vector<std::string>{"none.png"});
-    for (const ManifestEntry& entry : manifest.files)
-        fs::copy_file(*opened->files->path_of(entry.name), cache.path() / to_hex(entry.hash));
-    ManifestFiles sent(manifest, [&](const Digest& hash) { return cache.path() / to_hex(hash); });
-    const auto scene = parse_scene_file(to_json(opened->file), "state");
-    REQUIRE(scene);
-    testing::check_same(parts_of(*scene, sent), opened->parts);
-
-    // Other options need other files: that is an error on the server, not a silent difference.
-    ManifestFiles other({}, [&](const Digest&) { return cache.path(); });
-    CHECK(error_of(*scene, other).find("room.obj: the client did not list this file") != std::string::npos);
-}
-
-TEST_CASE("a bare OBJ gets a camera that sees it and, where nothing emits, a sky; both are said") {
-    const testing::TemporaryFolder folder;
-    write(folder.path() / "dark.obj", triangle("mtllib a.mtl\nusemtl dark\n"));
-    write(folder.path() / "bright.OBJ", triangle("mtllib a.mtl\nusemtl bright\n"));
-    write(folder.path() / "a.mtl", "newmtl dark\nKd 1 1 1\nnewmtl bright\nKe 1 1 1\n");
-    const Listener listener;
-    const auto dark = open_scene(folder.path() / "dark.obj", {});
-    REQUIRE(dark);
-    CHECK(dark->file.name == "dark");
-    REQUIRE(dark->file.cameras.size() == 1);
-    CHECK(check_camera(dark->file.cameras[0].view));
-    CHECK(dark->file.cameras[0].view.look_at == Vec3{0.5f, 0.5f, 0});
-    REQUIRE(dark->file.lights.size() == 2);
-    CHECK(std::holds_alternative<SkySpec>(dark->file.lights[1]));
-    CHECK(listener.count("note: No camera is named; it is put at") == 1);
-    CHECK(listener.count("note: No light is named and no material emits; a sky of radiance 1") == 1);
-
-    const auto bright = open_scene(folder.path() / "bright.OBJ", {});
-    REQUIRE(bright);
-    CHECK(bright->file.lights.size() == 1);
-    CHECK(bright->parts.materials[0].emits());
-}
-
-TEST_CASE("a bare OBJ that a scene.json beside it names takes camera and lights from there") {
-    const testing::TemporaryFolder folder;
-    for (const char* name : {"own.obj", "variant.obj", "other.obj"})
-        write(folder.path() / name, triangle("mtllib a.mtl\nusemtl m\n"));
-    write(folder.path() / "a.mtl", "newmtl m\nKd 1 1 1\n");
-    write(folder.path() / "scene.json", R"({"name": "s", "obj": "own.obj", "cameras": [
-        {"name": "a", "position": [0, 0, 1], "look_at": [0, 0, 0]},
-        {"name": "b", "position": [0, 0, 2], "look_at": [0, 0, 0]}], "variants": {"variant.obj": "b"},
-        "lights": [{"type": "sky", "radiance": [2, 2, 2]}], "materials": {"m": {"kd": [0.25, 0, 0]}}})");
-    const Listener listener;
-    const auto own = open_scene(folder.path() / "own.obj", {});
-    const auto variant = open_scene(folder.path() / "variant.obj", {});
-    const auto other = open_scene(folder.path() / "other.obj", {});
-    REQUIRE(own);
-    REQUIRE(variant);
-    REQUIRE(other);
-    CHECK(own->file.cameras[0].name == "a");
-    CHECK(own->parts.materials[0].kd == Rgb{0.25f, 0, 0});
-    CHECK(variant->file.cameras[0].name == "b");
-    CHECK(variant->file.name == "variant");
-    CHECK(std::get<SkySpec>(variant->file.lights[0]).radiance == Rgb{2, 2, 2});
-    CHECK(variant->parts.materials[0].kd == Rgb{1, 1, 1});
-    CHECK(other->file.cameras[0].name == "chosen");
-    CHECK(listener.count("note: Camera and lights of") == 2);
-
-    write(folder.path() / "scene.json", "{");
-    CHECK(open_scene(folder.path() / "own.obj", {}));
-    CHECK(listener.count("warning: " + (folder.path() / "scene.json").string() + ":1:2: not JSON") == 1);
-}
-
-TEST_CASE("open_scene refuses what is no scene, in a sentence") {
-    const testing::TemporaryFolder folder;
-    write(folder.path() / "a.txt", "x");
-    write(folder.path() / "bad.json", "{\"obj\": 1}");
-    write(folder.path() / "lost.json", "{\"obj\": \"none.obj\"}");
-    write(folder.path() / "latin\xe9.obj", triangle());
-    const Listener quiet;
-    const auto message = [&](const char* name) {
-        const auto opened = open_scene(folder.path() / name, {});
-        REQUIRE_FALSE(opened);
-        CHECK(opened.error().kind == ErrorKind::bad_input);
-        return opened.error().message;
-    };
-    const std::string root = folder.path().string() + "/";
-    CHECK(message("a.txt") == root + "a.txt is neither a scene file (.json) nor an OBJ (.obj).");
-    CHECK(message("none.obj") == root + "none.obj: there is no such file.");
-    CHECK(message("none.json").find(root + "none.json") != std::string::npos);
-    CHECK(message("bad.json") == root + "bad.json: obj: must be a text in quotes, not 1.");
-    CHECK(message("lost.json") == root + "none.obj: there is no such file.");
-    CHECK(message("latin\xe9.obj").find("is not UTF-8; rename it.") != std::string::npos);
-}
-
-TEST_CASE("the project's own scenes load, as far as their models are there") {
-    int loaded = 0;
-    for (const auto& entry : fs::recursive_directory_iterator("scenes")) {
-        if (entry.path().extension() != ".json") continue;
-        CAPTURE(entry.path());
-        const auto text = read_file(entry.path());
-        REQUIRE(text);
-        const auto scene = parse_scene_file(*text, entry.path().string());
-        REQUIRE_MESSAGE(scene, (scene ? "" : scene.error().message));
-        const bool is_generated = entry.path().parent_path().filename() == "atrium";
-        if (is_generated) continue;  // Its model is made by make-atrium, and large.
-        const Listener listener;
-        const auto opened = open_scene(entry.path(), {});
-        REQUIRE_MESSAGE(opened, (opened ? "" : opened.error().message));
-        CHECK(listener.said.empty());
-        ++loaded;
-    }
-    CHECK(loaded >= 4);
-}
-
-TEST_CASE("the shared scenes load: triangles, materials, textures") {
-    const auto folder = testing::shared_folder();
-    if (folder.empty()) {
-        MESSAGE("skipped: no ../shared");
-        return;
-    }
-    struct Case {
-        std::string path;
-        std::size_t triangles, materials, textures;
-        int said;
-    };
-    // As the folder's README counts them, less materials that no face uses and bump maps.
-    const Case cases[] = {
-        {"mitsuba_cornell/scene.json", 36, 8, 0, 0},
-        {"cornell_box/scene.json", 36, 8, 0, 0},
-        {"cornell_box/CornellBox-Water.obj", 7'088, 9, 0, 1},
-        {"cornell_box/CornellBox-Empty-CO.obj", 12, 6, 0, 1},
-        {"dabrovic_sponza/scene.json", 66'450, 20, 12, 2},
-        {"veach_mis/scene.json", 6'676, 8, 0, 0},
-        {"veach_ajar/scene.json", 51'594, 13, 4, 0},
-        {"stanford_dragon/scene.json", 100'002, 2, 0, 0},
-        {"conference/scene.json", 331'179, 35, 0, 0},
-        {"crytek_sponza/scene.json", 262'267, 25, 28, 1},
-    };
-    for (const Case& c : cases) {
-        if (testing::k_sanitized && c.triangles > 60'000) continue;
-        CAPTURE(c.path);
-        const Listener listener;
-        const auto opened = open_scene(folder / "scenes" / c.path, {});
-        REQUIRE_MESSAGE(opened, (opened ? "" : opened.error().message));
-        CHECK(opened->parts.mesh.triangles.size() + opened->parts.degenerate_triangles == c.triangles);
-        CHECK(opened->parts.materials.size() == c.materials);
-        CHECK(opened->parts.textures.size() == c.textures);
-        CHECK(int(listener.said.size()) == c.said);
-        for (const std::string& sentence : listener.said) MESSAGE(sentence);
-    }
 }

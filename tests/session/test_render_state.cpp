@@ -24,7 +24,10 @@ RenderState some_state() {
     state.settings.transport = make_settings(Setting::textbook);
     state.settings.transport.max_bounces = 7;
     state.settings.filter = FilterPlace::server;
+    state.settings.filter_kind = FilterKind::atrous;
     state.settings.bilateral.sigma_albedo = k_infinity;
+    state.settings.atrous.levels = 3;
+    state.settings.atrous.sigma_depth = 0.25f;
     state.settings.quantum = {-27};
     return state;
 }
@@ -87,6 +90,25 @@ TEST_CASE("what does not fit is refused in a sentence that names the key") {
         REQUIRE_FALSE(bool(state));
         CHECK(state.error().message.find("'" + key + "'") != std::string::npos);
     }
+}
+
+TEST_CASE("a filter that is not possible is refused in a sentence that names what is wrong with it") {
+    const PackMap good = *encode_state(some_state()).find("filter")->get<PackMap>();
+    const auto refusal = [&](std::string_view kind, std::string_view key, PackValue value) {
+        PackMap filter = good, params = *good.find(kind)->get<PackMap>();
+        params.set(key, std::move(value));
+        filter.set(kind, std::move(params));
+        const Result<RenderState> state = decode_with("filter", std::move(filter));
+        return state ? std::string() : state.error().message;
+    };
+    CHECK(refusal("joint", "radius", 7).empty());
+    CHECK(refusal("joint", "radius", 65).find("'radius'") != std::string::npos);
+    CHECK(refusal("atrous", "levels", 7).find("'levels'") != std::string::npos);
+    CHECK(refusal("atrous", "sigma_colour", 1e-6).find("sigma_colour") != std::string::npos);
+    CHECK(refusal("joint", "sigma_depth", -1).find("'sigma_depth'") != std::string::npos);
+    PackMap unknown = good;
+    unknown.set("width", 3);
+    CHECK_FALSE(bool(decode_with("filter", std::move(unknown))));
 }
 
 TEST_CASE("docs/protocol.md lists the keys of the state, in their order") {

@@ -98,6 +98,29 @@ class Bench(unittest.TestCase):
             self.assertLess(2 * row["rmse_after"], row["rmse_before"], row)
             self.assertLess(4 * row["rel_mse_after"], row["rel_mse_before"], row)
 
+    def test_trace(self):
+        words = ("--scene", "scenes/cornell", "--rays", 1024, "--kind", "shadow")
+        rows = [self.measure("trace", *words, "--tree", tree, "--passes", passes)["rows"]
+                for tree, passes in (("wide", 2), ("two-wide", 1), ("wide", 0))]
+        self.assertEqual([[row["ours"] for row in one] for one in rows], [["wide"], ["two-wide"], ["wide"]])
+        wide, two_wide, none = (one[0]["hits"] for one in rows)
+        self.assertEqual((wide, none), (two_wide, 0))  # Both trees give the same answers.
+        self.assertTrue(0 < wide < 1024)
+
+    def test_limits(self):
+        """The program itself checks that the circle of loads goes through the whole working set."""
+        file = self.measure("limits")
+        self.assertIn(file["simd"], {"portable", "avx2", "avx512"})
+        rows = {limit: [row for row in file["rows"] if row["limit"] == limit] for limit in ("arithmetic", "bandwidth", "latency")}
+        self.assertEqual(sum(map(len, rows.values())), len(file["rows"]))
+        self.assertIn("portable", {row["simd"] for row in rows["arithmetic"]})
+        self.assertTrue(all(row["gflops"] > 0 for row in rows["arithmetic"]))
+        for limit, figure in (("bandwidth", "gb_per_s"), ("latency", "ns")):
+            sizes = [row["bytes"] for row in rows[limit]]
+            self.assertEqual(sizes, [32768 * 4**i for i in range(8)])
+            self.assertTrue(all(row[figure] > 0 for row in rows[limit]))
+        self.assertLess(rows["latency"][0]["ns"], rows["latency"][-1]["ns"])  # By a factor of fifty, usually.
+
     def test_ledger(self):
         # The program itself checks that every tile was committed once.
         rows = self.measure("ledger")["rows"]
@@ -107,6 +130,7 @@ class Bench(unittest.TestCase):
     def test_refused(self):
         for words, named in ((["race"], "bvh"), (["bvh"], "--scenes"), (["bvh", "--scene", "nowhere"], "nowhere"),
                              (["ledger", "--rays", "1000"], "--rays"), (["filter", "--runs", "2"], "--runs"),
+                             (["trace", "--scene", "scenes/cornell", "--kind", "light"], "shadow3"),
                              (["ledger", "--json", "no/where.json"], "no/where.json"),
                              (["bvh", "--scene", "scenes/cornell", "--threads", "1024"], "--threads")):
             with self.subTest(words):

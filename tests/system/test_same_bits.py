@@ -18,10 +18,22 @@ SCENES = ["scenes/cornell/scene.json", "scenes/mis_plates/scene.json"]
 
 
 class SameBits(unittest.TestCase):
+    def test_filter_kinds(self):
+        with tempfile.TemporaryDirectory() as folder:
+            joint = self.hash_of(folder, SCENES[0], "avx2")
+            kinds = {(level, *how): self.hash_of(folder, SCENES[0], level, "--filter-kind", "atrous", "--filter-levels", "4", *how)
+                     for level, how in itertools.product(LEVELS, [["--threads", "1"], ["--servers", "1"]])}
+            self.assertEqual(len(set(kinds.values())), 1, kinds)
+            self.assertNotIn(joint, kinds.values())
+            at_server = [self.hash_of(folder, SCENES[0], "avx2", "--filter", "server", "--filter-kind", "atrous", *how)
+                         for how in (["--servers", "0"], ["--servers", "2"])]
+            self.assertEqual(at_server[0], at_server[1])
+
     def hash_of(self, folder, scene, level, *options):
+        place = [] if "--filter" in options else ["--filter", "client"]
         stats = pathlib.Path(folder) / "stats.json"
         subprocess.run([BIN / "pathscope-render", scene, "-o", pathlib.Path(folder) / "image.pfm", "--stats", stats, "--size",
-                        "75x50", "--spp", "6", "--seed", "3", "--filter", "client", *options], check=True,
+                        "75x50", "--spp", "6", "--seed", "3", *place, *options], check=True,
                        stderr=subprocess.DEVNULL, env=dict(os.environ, PATHSCOPE_SIMD=level))
         return json.loads(stats.read_text())["image_hash"]
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "pathscope/bvh/tree.hpp"
 #include "pathscope/core/result.hpp"
 
 namespace pathscope::bench {
@@ -26,6 +27,9 @@ struct BenchOptions {
     std::optional<std::size_t> rays;
     std::optional<std::pair<int, int>> size;  ///< In pixels.
     std::optional<int> spp, reference_spp;
+    TreeKind tree = TreeKind::wide;
+    std::string kind = "incoherent";  ///< Of rays: ray_sets.hpp.
+    int passes = 1;
 };
 
 /// What goes into the JSON beside machine and commit.
@@ -49,6 +53,8 @@ struct Bench {
 [[nodiscard]] Result<Report> bench_filter(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_image(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_ledger(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_limits(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_trace(const BenchOptions& options);
 
 /// {"bench", "machine", "commit", "version", "runs", "rows", ...}, as docs/performance.md explains them.
 [[nodiscard]] std::string report_json(const BenchOptions& options, const Report& report);

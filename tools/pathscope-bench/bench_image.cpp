@@ -13,6 +13,7 @@
 #include "measure.hpp"
 #include "pathscope/image/metrics.hpp"
 #include "pathscope/render/rendered_frame.hpp"
+#include "pictures.hpp"
 #include "scene_list.hpp"
 #include "terminal.hpp"
 
@@ -20,9 +21,6 @@ namespace pathscope::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr int k_block_size = 32;
-constexpr std::uint32_t k_reference_seed = 0x7ef;
 
 struct Task {
     const Scene& scene;

@@ -17,6 +17,11 @@ const std::vector<Bench>& bench_table() {
          {"--threads", "--size", "--scenes", "--scene", "--spp", "--reference-spp"},
          bench_filter},
         {"ledger", "tiles per second through ledger and schedule", {}, bench_ledger},
+        {"limits", "what a core can do at most: arithmetic, bandwidth, latency", {}, bench_limits},
+        {"trace",
+         "passes over one set of rays, for tools that count instructions",
+         {"--scenes", "--scene", "--rays", "--tree", "--kind", "--passes"},
+         bench_trace},
     };
     return table;
 }

@@ -11,6 +11,7 @@
 #include "pathscope/filter/atrous.hpp"
 #include "pathscope/image/metrics.hpp"
 #include "pathscope/render/rendered_frame.hpp"
+#include "pictures.hpp"
 #include "scene_list.hpp"
 #include "terminal.hpp"
 
@@ -18,9 +19,6 @@ namespace pathscope::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr int k_block_size = 32;
-constexpr std::uint32_t k_reference_seed = 0x7ef;
 
 struct Filter {
     std::string name;

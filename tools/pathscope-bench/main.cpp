@@ -36,7 +36,7 @@ void add_options(CLI::App& app, BenchOptions& options) {
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 1024))
         ->type_name("N,...");
-    app.add_option("--rays", options.rays, "bvh: rays of each kind (1048576)")
+    app.add_option("--rays", options.rays, "bvh, trace: rays of each kind (1048576; trace: 16384)")
         ->check(CLI::Range(256, 1 << 26))
         ->type_name("N");
     add_size(app, options.size, "pixels (image: 256x144; filter: 1280x720)");
@@ -46,6 +46,11 @@ void add_options(CLI::App& app, BenchOptions& options) {
     app.add_option("--reference-spp", options.reference_spp,
                    "image: of the picture that is taken for true (256)")
         ->check(samples)
+        ->type_name("N");
+    add_lever(app, "--tree", options.tree, "trace: by which tree");
+    app.add_option("--kind", options.kind, "trace: which rays (incoherent)")->type_name("NAME");
+    app.add_option("--passes", options.passes, "trace: how often all rays are traced (1)")
+        ->check(CLI::Range(0, 1'000'000))
         ->type_name("N");
 }
 

@@ -72,10 +72,16 @@ void add_levers(CLI::App& app, RenderOptions& options) {
         ->type_name("on|off");
     add_lever(app, "--texel-space", options.scene_options.texel_space,
               "in what colour textures are interpolated");
-    add_lever(app, "--filter", options.settings.filter, "joint bilateral filter of indirect light");
+    add_lever(app, "--filter", options.settings.filter, "where indirect light is filtered");
+    add_lever(app, "--filter-kind", options.settings.filter_kind, "by which filter");
     app.add_option("--filter-radius", options.settings.bilateral.radius,
-                   fmt::format("in pixels ({})", options.settings.bilateral.radius))
+                   fmt::format("of the joint filter, in pixels ({})", options.settings.bilateral.radius))
         ->check(CLI::Range(0, k_max_filter_radius))
+        ->type_name("N");
+    app.add_option("--filter-levels", options.settings.atrous.levels,
+                   fmt::format("of the a-trous filter, which sees twice as far with each ({})",
+                               options.settings.atrous.levels))
+        ->check(CLI::Range(0, k_max_atrous_levels))
         ->type_name("N");
 }
 

@@ -16,8 +16,8 @@
 /// from pass to pass: each smooths it, so sigma_colour is halved with each level, and what the noise-free guides do not
 /// show (a shadow) can still be kept where it stands out of the noise. It is off by default: at few samples a pixel differs
 /// from its neighbours by noise, and a filter that respects differences respects noise.
-/// Reach: 2 (2^levels - 1) pixels. A block filtered alone would need an apron of that width, and servers have none: this
-/// filter is for the assembled picture.
+/// Reach: 2 (2^levels - 1) pixels. A block filtered alone would need an apron of that width to look as in the assembled
+/// picture, and servers have none: what is wider than a block stays different from block to block, and shows its seams.
 /// Determinism: the same bits for any number of threads and any instruction set.
 /// Source: Dammertz, Sewtz, Hanika & Lensch 2010, "Edge-Avoiding À-Trous Wavelet Transform for fast Global Illumination
 ///         Filtering"; Holschneider et al. 1989 (algorithme à trous).

@@ -17,7 +17,8 @@
 /// headers come before the pragma, lest a function that all share be compiled for the newest machine.
 ///
 /// Convention: min and max return the second operand where one is NaN; comparisons with NaN are false. Sums and products
-/// round as scalar ones do, lane by lane: the bits are the same at every level.
+/// round as scalar ones do, lane by lane: the bits are the same at every level. So does fused(), which has one rounding at
+/// every level, and is slow on a machine whose instructions have two (fused.hpp).
 /// Thread safety: pure.   Test: tests/math/test_simd.cpp
 
 #include <algorithm>
@@ -26,6 +27,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "pathscope/math/fused.hpp"
 #include "pathscope/math/simd_level.hpp"
 
 #if defined(__SSE4_1__)
@@ -481,6 +483,10 @@ using Floats = Float16;
 [[nodiscard]] inline Floats load_floats(const float* many) { return {_mm512_loadu_ps(many)}; }
 inline void store_floats(float* many, Floats a) { _mm512_storeu_ps(many, a.lanes); }
 [[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast16(a); }
+/// a b + c, rounded once (fused.hpp).
+[[nodiscard]] inline Floats fused(Floats a, Floats b, Floats c) {
+    return {_mm512_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
 /// a 2^n, where n stands in the last bits of `n_below` as a whole number, as it does in 0x1.8p23f + n.
 /// Requires: the result is a normal number, or a is 1 and n is -127, which gives 0.
 [[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
@@ -495,6 +501,9 @@ using Floats = Float8;
 [[nodiscard]] inline Floats load_floats(const float* many) { return {_mm256_loadu_ps(many)}; }
 inline void store_floats(float* many, Floats a) { _mm256_storeu_ps(many, a.lanes); }
 [[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast(a); }
+[[nodiscard]] inline Floats fused(Floats a, Floats b, Floats c) {
+    return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
 [[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
     const __m256i exponent = _mm256_slli_epi32(_mm256_castps_si256(n_below.lanes), 23);
     return {_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a.lanes), exponent))};
@@ -524,6 +533,20 @@ inline void store_floats(float* many, Floats a) { store(many, a); }
         return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) +
                                     (std::bit_cast<std::uint32_t>(n) << 23));
     });
+}
+
+#endif
+
+#if !PATHSCOPE_SIMD_AT_LEAST(avx2)
+
+[[nodiscard]] inline Floats fused(Floats a, Floats b, Floats c) {
+    std::array<std::array<float, 4>, 3> in;
+    store_floats(in[0].data(), a);
+    store_floats(in[1].data(), b);
+    store_floats(in[2].data(), c);
+    std::array<float, 4> out;
+    for (std::size_t i = 0; i < 4; ++i) out[i] = fused_multiply_add(in[0][i], in[1][i], in[2][i]);
+    return load_floats(out.data());
 }
 
 #endif

@@ -9,13 +9,14 @@
 #include <cstdint>
 
 #include "pathscope/core/enum_names.hpp"
+#include "pathscope/filter/atrous.hpp"
 #include "pathscope/filter/joint_bilateral.hpp"
 #include "pathscope/image/exact_sum.hpp"
 #include "pathscope/integrator/settings.hpp"
 
 namespace pathscope {
 
-/// Where the joint bilateral filter runs: on each tile at the server, whose block borders then show as seams, or on the
+/// Where the filter of indirect light runs: on each tile at the server, whose block borders then show as seams, or on the
 /// whole indirect buffer at the client.
 enum class FilterPlace { off, server, client };
 
@@ -23,6 +24,13 @@ constexpr std::array k_filter_place_names{EnumName<FilterPlace>{FilterPlace::off
                                           EnumName<FilterPlace>{FilterPlace::server, "server"},
                                           EnumName<FilterPlace>{FilterPlace::client, "client"}};
 constexpr const auto& enum_table(FilterPlace) { return k_filter_place_names; }
+
+/// Which filter it is: indirect_filter.hpp.
+enum class FilterKind { joint, atrous };
+
+constexpr std::array k_filter_kind_names{EnumName<FilterKind>{FilterKind::joint, "joint"},
+                                         EnumName<FilterKind>{FilterKind::atrous, "atrous"}};
+constexpr const auto& enum_table(FilterKind) { return k_filter_kind_names; }
 
 struct RenderSettings {
     int width = 640;
@@ -32,8 +40,10 @@ struct RenderSettings {
     std::uint32_t seed = 1;
     TransportSettings transport;
     FilterPlace filter = FilterPlace::off;
-    BilateralParams bilateral;
-    Quantum quantum;  ///< Step of the exact sums; from quantum_for() of the scene.
+    FilterKind filter_kind = FilterKind::joint;
+    BilateralParams bilateral;  ///< Of FilterKind::joint.
+    AtrousParams atrous;        ///< Of FilterKind::atrous.
+    Quantum quantum;            ///< Step of the exact sums; from quantum_for() of the scene.
 
     friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };
