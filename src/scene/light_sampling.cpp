@@ -45,19 +45,37 @@ float triangle_pdf(const Connection& to_light, const TriangleLight& light, Vec3 
     return to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
 }
 
+/// A point drawn on a surface, which sends `radiance` to the reference.
+std::optional<LightSample> surface_sample(const RayTarget& target, const Connection& to_light, Rgb radiance,
+                                          float pdf_solid_angle) {
+    std::optional<LightSample> sample;
+    if (is_zero(radiance) || !(pdf_solid_angle > 0)) return sample;
+    sample.emplace();
+    sample->direction = to_light.direction;
+    sample->distance = to_light.distance;
+    sample->target = target;
+    sample->radiance = radiance;
+    sample->pdf_solid_angle = pdf_solid_angle;
+    return sample;
+}
+
 std::optional<LightSample> sample(const Request& request, const TriangleLight& light) {
     const Vec2 weights = sample_triangle(request.u);
+    const auto connect = [&](const RayTarget& target, auto radiance_towards) -> std::optional<LightSample> {
+        const Connection to_light(request.reference, target.position);
+        if (!to_light.valid()) return std::nullopt;
+        return surface_sample(target, to_light, radiance_towards(-to_light.direction),
+                              request.pick_probability * triangle_pdf(to_light, light, target.normal));
+    };
+    if (light.even) {
+        const Vec3 position = exact_point(light.corners, weights.x, weights.y);
+        return connect({position, position_error(position, light.longest_side), light.normal}, [&](Vec3 outgoing) {
+            return light.two_sided || dot(light.normal, outgoing) > 0 ? light.mean_radiance : Rgb{};
+        });
+    }
     const SurfacePoint point = surface_point(request.scene.mesh, {0, weights.x, weights.y, light.triangle});
-    const Connection to_light(request.reference, point.position);
-    if (!to_light.valid()) return std::nullopt;
-
-    LightSample sample;
-    sample.direction = to_light.direction;
-    sample.distance = to_light.distance;
-    sample.target = {point.position, point.position_error, point.geometric_normal};
-    sample.radiance = emission_at(request.scene, point, -to_light.direction);
-    sample.pdf_solid_angle = request.pick_probability * triangle_pdf(to_light, light, point.geometric_normal);
-    return unless_dark(sample);
+    return connect({point.position, point.position_error, point.geometric_normal},
+                   [&](Vec3 outgoing) { return emission_at(request.scene, point, outgoing); });
 }
 
 float sphere_area_pdf(float radius) { return k_inv_pi / (4 * radius * radius); }

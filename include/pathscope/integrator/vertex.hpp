@@ -23,16 +23,18 @@ namespace pathscope {
 inline constexpr std::uint32_t k_pixel_dimension = 0;
 
 /// The random numbers of one bounce, each decision with a dimension of its own: whoever skips a decision (the direct
-/// pass plays no roulette) leaves the others as they are.
+/// pass plays no roulette) leaves the others as they are. The four that nearly every vertex needs are made together.
 class BounceSample {
   public:
     BounceSample(const PixelSampler& sampler, int bounce)
-        : sampler_(&sampler), base_(1 + k_decisions * std::uint32_t(bounce)) {}
+        : sampler_(&sampler),
+          base_(1 + k_decisions * std::uint32_t(bounce)),
+          pairs_(sampler.get_four_2d(base_)) {}
 
-    [[nodiscard]] float light_pick() const { return sampler_->get_1d(base_); }
-    [[nodiscard]] Vec2 light_point() const { return sampler_->get_2d(base_ + 1); }
-    [[nodiscard]] float lobe() const { return sampler_->get_1d(base_ + 2); }
-    [[nodiscard]] Vec2 direction() const { return sampler_->get_2d(base_ + 3); }
+    [[nodiscard]] float light_pick() const { return pairs_.x[0]; }
+    [[nodiscard]] Vec2 light_point() const { return pairs_[1]; }
+    [[nodiscard]] float lobe() const { return pairs_.x[2]; }
+    [[nodiscard]] Vec2 direction() const { return pairs_[3]; }
     [[nodiscard]] float roulette() const { return sampler_->get_1d(base_ + 4); }
 
   private:
@@ -40,6 +42,7 @@ class BounceSample {
 
     const PixelSampler* sampler_;
     std::uint32_t base_;
+    FourPairs pairs_;
 };
 
 struct Vertex {
