@@ -243,9 +243,4 @@ float sample_environment_pdf(const Scene& scene, LightSampling sampling, const L
     return sum;
 }
 
-Ray shadow_ray(const SurfacePoint& from, const LightSample& sample) {
-    return std::isinf(sample.distance) ? spawn_ray(from, sample.direction)
-                                       : spawn_ray_to(from, sample.target);
-}
-
 }  // namespace pathscope

@@ -31,7 +31,8 @@ inline constexpr float k_offset_safety = 4;
 /// length one; error >= 0, with the rounding of the position itself included (hit.hpp).
 [[nodiscard]] inline Vec3 offset_origin(Vec3 position, Vec3 error, Vec3 geometric_normal, Vec3 direction) {
     const float distance = k_offset_safety * dot(abs(geometric_normal), error);
-    return position + geometric_normal * (dot(direction, geometric_normal) >= 0 ? distance : -distance);
+    const float side = dot(direction, geometric_normal) + 0.0f;  // Makes -0 +0.
+    return position + geometric_normal * std::copysign(distance, side);
 }
 
 /// Requires: direction of length one.

@@ -16,6 +16,7 @@
 #include "pathscope/scene/light_sampling.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "pathscope/scene/surface.hpp"
+#include "pathscope/shading/seen_bsdf.hpp"
 
 namespace pathscope {
 
@@ -48,7 +49,7 @@ class BounceSample {
 struct Vertex {
     SurfacePoint point;
     ShadedPoint shaded;
-    Vec3 outgoing;          ///< Local.
+    SeenBsdf seen;          ///< Along `outgoing`, local: shared by all samples taken here.
     bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
 
     [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
@@ -56,10 +57,9 @@ struct Vertex {
 
 /// Requires: outgoing of length one, in world space.
 [[nodiscard]] inline Vertex make_vertex(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
-    Vertex vertex{hit.point, shade_point(scene, hit, outgoing), {}, false};
-    vertex.outgoing = vertex.shaded.frame.to_local(outgoing);
-    vertex.specular = is_specular(vertex.shaded.bsdf);
-    return vertex;
+    const ShadedPoint shaded = shade_point(scene, hit, outgoing);
+    return {hit.point, shaded, see_bsdf(shaded.bsdf, shaded.frame.to_local(outgoing)),
+            is_specular(shaded.bsdf)};
 }
 
 /// What a ray leaves, as far as the light that it runs into must know: by which density its direction was drawn.
@@ -80,8 +80,8 @@ struct NextDirection {
 [[nodiscard]] inline std::optional<NextDirection> sample_next_direction(const TransportSettings& settings,
                                                                         const Vertex& vertex,
                                                                         const BounceSample& random) {
-    const std::optional<BsdfSample> sample = sample_direction(
-        settings.hemisphere, vertex.shaded.bsdf, vertex.outgoing, random.lobe(), random.direction());
+    const std::optional<BsdfSample> sample =
+        sample_direction(settings.hemisphere, vertex.seen, random.lobe(), random.direction());
     if (!sample) return std::nullopt;
     const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
     if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
