@@ -112,23 +112,27 @@ DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& sur
     return {incoming, {value, hemisphere_pdf(sampling, seen.outgoing, incoming)}};
 }
 
+/// Nothing if no light can come from there.
 template <class Kind>
 std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind& surface,
                                          const SeenBsdf& seen, float u_lobe, Vec2 u) {
     if constexpr (k_is_delta<Kind>) {
-        return sample_delta(surface, seen.outgoing, u_lobe);
+        const BsdfSample sample = sample_delta(surface, seen.outgoing, u_lobe);
+        return is_zero(sample.weight) ? std::nullopt : std::optional(sample);
     } else {
-        if (!(seen.outgoing.z > 0)) return std::nullopt;
+        std::optional<BsdfSample> sample;
+        if (!(seen.outgoing.z > 0)) return sample;
         const DirectionSample drawn = sampling == HemisphereSampling::bsdf
                                           ? sample_lobes(surface, seen, u_lobe, u)
                                           : sample_hemisphere(sampling, surface, seen, u);
         const float pdf = drawn.value.pdf_solid_angle;
-        if (!(pdf > 0)) return std::nullopt;
-        BsdfSample sample;
-        sample.incoming = drawn.incoming;
-        sample.value = drawn.value.value;
-        sample.pdf_solid_angle = pdf;
-        sample.weight = sample.value * (sample.incoming.z / pdf);
+        const Rgb weight = drawn.value.value * (drawn.incoming.z / pdf);
+        if (!(pdf > 0) || is_zero(weight)) return sample;
+        sample.emplace();
+        sample->incoming = drawn.incoming;
+        sample->value = drawn.value.value * seen.bsdf.opacity;
+        sample->pdf_solid_angle = pdf * seen.bsdf.opacity;
+        sample->weight = weight;
         return sample;
     }
 }
@@ -153,13 +157,9 @@ std::optional<BsdfSample> sample_direction(HemisphereSampling sampling, const Se
     if (u_lobe >= bsdf.opacity) return straight_sample(seen.outgoing, {1, 1, 1});
     // Given that the ray meets the surface, u_lobe is uniform below the opacity: stretched, it serves again.
     const float u_surface = std::min(u_lobe / bsdf.opacity, k_one_minus_epsilon);
-    std::optional<BsdfSample> sample = std::visit(
+    return std::visit(
         [&](const auto& surface) { return sample_surface(sampling, surface, seen, u_surface, u); },
         bsdf.surface);
-    if (!sample || is_zero(sample->weight)) return std::nullopt;
-    sample->value *= bsdf.opacity;
-    sample->pdf_solid_angle *= bsdf.opacity;
-    return sample;
 }
 
 Rgb eval_bsdf(const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {

@@ -28,7 +28,7 @@ struct DoubleVec {
     const double ab = a * b;
     const double cd = c * d;
     // Equal products are most often both zero: edges along the axes, which need no closer look.
-    if ((ab == cd) & (ab != 0)) [[unlikely]]  // One branch: which edges lie along axes nobody can foretell.
+    if ((ab == cd) & (ab != 0)) [[unlikely]]
         return std::fma(a, b, -ab) - std::fma(c, d, -cd);
     return ab - cd + 0.0;  // Makes -0 +0.
 }

@@ -65,7 +65,6 @@ struct RayTarget {
     return {origin, segment / distance, 0, distance};
 }
 
-
 [[nodiscard]] inline Ray spawn_ray_to(const SurfacePoint& point, const SurfacePoint& target) {
     return spawn_ray_to(point, RayTarget{target.position, target.position_error, target.geometric_normal});
 }

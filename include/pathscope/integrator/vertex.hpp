@@ -80,15 +80,17 @@ struct NextDirection {
 [[nodiscard]] inline std::optional<NextDirection> sample_next_direction(const TransportSettings& settings,
                                                                         const Vertex& vertex,
                                                                         const BounceSample& random) {
+    std::optional<NextDirection> next;
     const std::optional<BsdfSample> sample =
         sample_direction(settings.hemisphere, vertex.seen, random.lobe(), random.direction());
-    if (!sample) return std::nullopt;
+    if (!sample) return next;
     const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
-    if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
-    return NextDirection{
-        direction,
-        sample->weight,
-        {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular}};
+    if (!is_consistent(vertex.shaded, direction)) return next;
+    next.emplace();
+    next->direction = direction;
+    next->weight = sample->weight;
+    next->origin = {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular};
+    return next;
 }
 
 }  // namespace pathscope

@@ -48,8 +48,8 @@ struct TriangleLight {
     /// True if normal and emission are the same at each of its points. Then all that sampling needs to know lies here, in
     /// one place of memory, and mean_radiance is the radiance; else the mesh and the maps are asked at each point.
     bool even = false;
-    TriangleCorners corners;
-    Vec3 normal;  ///< As surface_point() gives it.
+    TriangleCorners corners{};
+    Vec3 normal{};  ///< As surface_point() gives it.
     float longest_side = 0;
 };
 
