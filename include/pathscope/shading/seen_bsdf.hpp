@@ -20,13 +20,14 @@ struct SeenBsdf {
     Bsdf bsdf;
     Vec3 outgoing;
     std::optional<StandardView> standard;  ///< Of a StandardSurface seen from above: it reflects.
+
+    SeenBsdf(const Bsdf& seen, Vec3 from) : bsdf(seen), outgoing(from) {
+        const auto* surface = std::get_if<StandardSurface>(&bsdf.surface);
+        if (surface != nullptr && outgoing.z > 0) standard.emplace(*surface, outgoing);
+    }
 };
 
-[[nodiscard]] inline SeenBsdf see_bsdf(const Bsdf& bsdf, Vec3 outgoing) {
-    const auto* standard = std::get_if<StandardSurface>(&bsdf.surface);
-    if (standard == nullptr || !(outgoing.z > 0)) return {bsdf, outgoing, std::nullopt};
-    return {bsdf, outgoing, StandardView(*standard, outgoing)};
-}
+[[nodiscard]] inline SeenBsdf see_bsdf(const Bsdf& bsdf, Vec3 outgoing) { return {bsdf, outgoing}; }
 
 /// As eval_bsdf_and_pdf() of bsdf.hpp.
 [[nodiscard]] BsdfValue eval_bsdf_and_pdf(HemisphereSampling sampling, const SeenBsdf& seen, Vec3 incoming);
