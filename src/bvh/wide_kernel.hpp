@@ -18,8 +18,8 @@ inline namespace PATHSCOPE_SIMD {
 ///     (plane - o) / d  =  plane / d  +  offset,      offset = -o / d
 ///
 /// The rounding of the offset moves o by another half ulp of its own, of the four that BoxRay has moved it. But infinity
-/// minus infinity is no number, and would meet every box; so 1/d ends at 2^80 times that of the longest axis. A slab as thin
-/// as the error of the test is then left at t = 2^32 times the distances of the scene, which is behind any hit.
+/// minus infinity is no number, and would meet every box; so 1/d ends at 2^52 times that of the longest axis. BoxRay moves o
+/// by 2^-48 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
 struct WideBoxRay {
     struct Slab {
         Float8 near_offset, far_offset, inverse;
@@ -33,7 +33,7 @@ struct WideBoxRay {
 
   private:
     static Slab slab(const BoxRay& ray, int axis, SlabPlanes planes) {
-        const float most = 0x1p80f * min_component(abs(ray.inverse));
+        const float most = 0x1p52f * min_component(abs(ray.inverse));
         const float inverse = std::max(std::min(ray.inverse[axis], most), -most);
         return {broadcast(-ray.near_origin[axis] * inverse), broadcast(-ray.far_origin[axis] * inverse),
                 broadcast(inverse), planes.near * k_wide, planes.far * k_wide};

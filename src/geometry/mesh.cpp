@@ -2,20 +2,8 @@
 
 #include <string>
 
-#include "geometry/double_vec.hpp"
-#include "pathscope/geometry/triangle.hpp"
-
 namespace pathscope {
 namespace {
-
-/// Twice the area times the normal. Exact zero for degenerate triangles: differences of floats are exact in double
-/// (unless 2^29 apart in size), and so is the comparison of their products.
-DoubleVec area_vector(const TriangleCorners& t) {
-    const DoubleVec p = to_double(t.b) - to_double(t.a);
-    const DoubleVec q = to_double(t.c) - to_double(t.a);
-    return {difference_of_products(p.y, q.z, p.z, q.y), difference_of_products(p.z, q.x, p.x, q.z),
-            difference_of_products(p.x, q.y, p.y, q.x)};
-}
 
 Error wrong_length(const char* what, std::size_t found, std::size_t expected) {
     return bad_input("the mesh has " + std::to_string(found) + " " + what + ", it needs none or " +
@@ -62,20 +50,6 @@ Result<void> check_indices(const Mesh& mesh) {
 }
 
 }  // namespace
-
-bool is_degenerate(const TriangleCorners& triangle) {
-    const DoubleVec n = area_vector(triangle);
-    return n.x == 0 && n.y == 0 && n.z == 0;
-}
-
-Vec3 geometric_normal(const TriangleCorners& triangle) {
-    const DoubleVec n = area_vector(triangle);
-    const double size = length(n);
-    if (size == 0) return {};
-    return to_float(1 / size * n);
-}
-
-float area(const TriangleCorners& triangle) { return float(0.5 * length(area_vector(triangle))); }
 
 Box bounds(const Mesh& mesh) {
     Box box;

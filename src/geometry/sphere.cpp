@@ -1,6 +1,6 @@
 #include "pathscope/geometry/sphere.hpp"
 
-#include "geometry/double_vec.hpp"
+#include "pathscope/geometry/double_vec.hpp"
 
 namespace pathscope {
 namespace {

@@ -12,6 +12,7 @@ struct Request {
     const Scene& scene;
     LightSampling sampling;
     const LightReference& reference;
+    std::uint32_t light;  ///< That was picked.
     float pick_probability;
     Vec2 u;
 };
@@ -34,8 +35,9 @@ struct Connection {
 };
 
 /// A sample that carries light, or nothing.
-std::optional<LightSample> unless_dark(const LightSample& sample) {
+std::optional<LightSample> unless_dark(const Request& request, LightSample sample) {
     if (is_zero(sample.radiance) || !(sample.pdf_solid_angle > 0)) return std::nullopt;
+    sample.light = request.light;
     return sample;
 }
 
@@ -46,18 +48,33 @@ float triangle_pdf(const Connection& to_light, const TriangleLight& light, Vec3 
 }
 
 std::optional<LightSample> sample(const Request& request, const TriangleLight& light) {
+    std::optional<LightSample>
+        sample;  // The only thing returned, so that it is made where the caller wants it.
     const Vec2 weights = sample_triangle(request.u);
-    const SurfacePoint point = surface_point(request.scene.mesh, {0, weights.x, weights.y, light.triangle});
+    SurfacePoint point;
+    if (light.even) {
+        point.position = exact_point(light.corners, weights.x, weights.y);
+        point.position_error = position_error(point.position, light.longest_side);
+        point.geometric_normal = light.normal;
+    } else {
+        point = surface_point(request.scene.mesh, {0, weights.x, weights.y, light.triangle});
+    }
     const Connection to_light(request.reference, point.position);
-    if (!to_light.valid()) return std::nullopt;
+    if (!to_light.valid()) return sample;
+    const bool faces_reference = light.two_sided || dot(point.geometric_normal, to_light.direction) < 0;
+    const float pdf = request.pick_probability * triangle_pdf(to_light, light, point.geometric_normal);
+    if (!faces_reference || !(pdf > 0)) return sample;
 
-    LightSample sample;
-    sample.direction = to_light.direction;
-    sample.distance = to_light.distance;
-    sample.target = {point.position, point.position_error, point.geometric_normal};
-    sample.radiance = emission_at(request.scene, point, -to_light.direction);
-    sample.pdf_solid_angle = request.pick_probability * triangle_pdf(to_light, light, point.geometric_normal);
-    return unless_dark(sample);
+    sample.emplace();
+    sample->direction = to_light.direction;
+    sample->distance = to_light.distance;
+    sample->target = {point.position, point.position_error, point.geometric_normal};
+    sample->radiance =
+        light.even ? light.mean_radiance : emission_at(request.scene, point, -to_light.direction);
+    sample->pdf_solid_angle = pdf;
+    sample->light = request.light;
+    if (is_zero(sample->radiance)) sample.reset();
+    return sample;
 }
 
 float sphere_area_pdf(float radius) { return k_inv_pi / (4 * radius * radius); }
@@ -93,7 +110,7 @@ std::optional<LightSample> sample_sphere_area(const Request& request, const Sphe
     sample.radiance = light.radiance;
     sample.pdf_solid_angle =
         request.pick_probability * to_light.to_solid_angle(sphere_area_pdf(sphere.radius), normal);
-    return unless_dark(sample);
+    return unless_dark(request, sample);
 }
 
 std::optional<LightSample> sample_sphere_cone(const Request& request, const SphereLight& light,
@@ -111,7 +128,7 @@ std::optional<LightSample> sample_sphere_cone(const Request& request, const Sphe
     sample.target = {hit->position, hit->position_error, hit->normal};
     sample.radiance = light.radiance;
     sample.pdf_solid_angle = request.pick_probability * sample_cone_pdf(cone->one_minus_cos);
-    return unless_dark(sample);
+    return unless_dark(request, sample);
 }
 
 std::optional<LightSample> sample(const Request& request, const SphereLight& light) {
@@ -140,7 +157,7 @@ std::optional<LightSample> sample(const Request& request, const PointLight& ligh
     sample.radiance = light.intensity / (to_light.distance * to_light.distance);
     sample.pdf_solid_angle = request.pick_probability;
     sample.delta = true;
-    return unless_dark(sample);
+    return unless_dark(request, sample);
 }
 
 std::optional<LightSample> sample_delta_sun(const Request& request, const SunLight& light) {
@@ -149,7 +166,7 @@ std::optional<LightSample> sample_delta_sun(const Request& request, const SunLig
     sample.radiance = light.irradiance;
     sample.pdf_solid_angle = request.pick_probability;
     sample.delta = true;
-    return unless_dark(sample);
+    return unless_dark(request, sample);
 }
 
 // ---- Infinity.
@@ -161,7 +178,7 @@ std::optional<LightSample> complete(const Request& request, Vec3 direction) {
     sample.radiance = environment_radiance(request.scene, direction);
     sample.pdf_solid_angle =
         sample_environment_pdf(request.scene, request.sampling, request.reference, direction);
-    return unless_dark(sample);
+    return unless_dark(request, sample);
 }
 
 std::optional<LightSample> sample(const Request& request, const SunLight& light) {
@@ -193,11 +210,9 @@ std::optional<LightSample> sample_light(const Scene& scene, LightSampling sampli
                                         const LightReference& reference, float u_pick, Vec2 u) {
     const auto pick = pick_light(scene.lights, sampling, reference, u_pick);
     if (!pick) return std::nullopt;
-    const Request request{scene, sampling, reference, pick->probability, u};
-    auto result =
-        std::visit([&](const auto& kind) { return sample(request, kind); }, scene.lights.lights[pick->light]);
-    if (result) result->light = pick->light;
-    return result;
+    const Request request{scene, sampling, reference, pick->light, pick->probability, u};
+    return std::visit([&](const auto& kind) { return sample(request, kind); },
+                      scene.lights.lights[request.light]);
 }
 
 float sample_light_pdf(const Scene& scene, LightSampling sampling, const LightReference& reference,
@@ -222,11 +237,6 @@ float sample_environment_pdf(const Scene& scene, LightSampling sampling, const L
         sum += pick_probability(scene.lights, sampling, reference, light) *
                direction_pdf(scene, scene.lights.lights[light], reference, direction);
     return sum;
-}
-
-Ray shadow_ray(const SurfacePoint& from, const LightSample& sample) {
-    return std::isinf(sample.distance) ? spawn_ray(from, sample.direction)
-                                       : spawn_ray_to(from, sample.target);
 }
 
 }  // namespace pathscope

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "pathscope/core/check.hpp"
+#include "pathscope/geometry/hit.hpp"
 
 namespace pathscope {
 namespace {
@@ -60,6 +61,18 @@ Distribution1d make_pick(const std::vector<double>& weights) {
     auto pick = Distribution1d::make(relative);
     CHECK(pick, weights.size(), largest);
     return *std::move(pick);
+}
+
+/// Whether surface_point() gives one geometric normal all over the triangle: it does unless the normals of the corners
+/// can be mixed to one that lies below the plane. Those that come near to it, by rounding, are not trusted.
+bool has_one_normal(const Mesh& mesh, std::uint32_t triangle, Vec3 normal) {
+    if (mesh.normals.empty()) return true;
+    const auto clearly_above = [&](std::uint32_t vertex) {
+        const Vec3 n = mesh.normals[vertex];
+        return is_zero(n) || dot(n, normal) > 0.001f * length(n);
+    };
+    const TriangleIndices& i = mesh.triangles[triangle];
+    return clearly_above(i.a) && clearly_above(i.b) && clearly_above(i.c);
 }
 
 bool seen_by_escaping_rays(const Light& light) {
@@ -157,6 +170,20 @@ LightSampling in_effect(const LightTable& table, LightSampling sampling) {
 }
 
 }  // namespace
+
+TriangleLight make_triangle_light(const Mesh& mesh, std::uint32_t triangle, const Material& material,
+                                  Rgb mean_radiance) {
+    TriangleLight light;
+    light.triangle = triangle;
+    light.corners = corners(mesh, triangle);
+    light.area = area(light.corners);
+    light.mean_radiance = mean_radiance;
+    light.two_sided = material.two_sided_emission;
+    light.longest_side = longest_side(light.corners);
+    light.normal = surface_point(mesh, {0, 1 / 3.0f, 1 / 3.0f, triangle}).geometric_normal;
+    light.even = !material.map_ke && !material.map_d && has_one_normal(mesh, triangle, light.normal);
+    return light;
+}
 
 SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg) {
     CHECK(angle_deg >= 0 && angle_deg <= 180, angle_deg);

@@ -105,11 +105,10 @@ void add_triangle_lights(Scene& scene) {
         if (!material.emits()) continue;
         if (table.of_triangle.empty()) table.of_triangle.assign(scene.mesh.triangle_count(), k_no_light);
         const TriangleCorners where = corners(scene.mesh, triangle);
-        const float surface = area(where);
-        if (!(surface > 0) || !seen.insert(corner_set(where)).second) continue;
+        if (!(area(where) > 0) || !seen.insert(corner_set(where)).second) continue;
         table.of_triangle[triangle] = std::uint32_t(table.lights.size());
         table.lights.push_back(
-            TriangleLight{triangle, surface, mean_radiance(scene, triangle), material.two_sided_emission});
+            make_triangle_light(scene.mesh, triangle, material, mean_radiance(scene, triangle)));
     }
 }
 

@@ -35,24 +35,26 @@ SceneHit hit_on_sphere(const Scene& scene, const NearestSphere& nearest) {
     return hit;
 }
 
-SceneHit hit_on_mesh(const Scene& scene, const Hit& found) {
-    SceneHit hit;
+void fill_hit_on_mesh(const Scene& scene, const Hit& found, SceneHit& hit) {
     hit.point = surface_point(scene.mesh, found);
     hit.distance = found.t;
     // The material is asked first: it is needed anyway, while the table is one more line from memory.
     if (scene.materials[hit.point.material].emits()) hit.light = scene.lights.of_triangle[found.triangle];
-    return hit;
 }
 
 std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& hit) {
+    std::optional<SceneHit> completed;
     if (!scene.spheres.empty()) {
         Ray rest = ray;
         if (hit) rest.t_max = hit->t;
         const auto sphere = nearest_sphere(scene, rest);
-        if (sphere && !(hit && sphere->hit.t == hit->t)) return hit_on_sphere(scene, *sphere);
+        if (sphere && !(hit && sphere->hit.t == hit->t)) {
+            completed = hit_on_sphere(scene, *sphere);
+            return completed;
+        }
     }
-    if (!hit) return std::nullopt;
-    return hit_on_mesh(scene, *hit);
+    if (hit) fill_hit_on_mesh(scene, *hit, completed.emplace());
+    return completed;
 }
 
 /// The holes of cut-outs, for a traversal. Scenes without any need not ask.

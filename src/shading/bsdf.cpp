@@ -3,6 +3,7 @@
 #include "pathscope/sampling/warp.hpp"
 #include "pathscope/shading/fresnel.hpp"
 #include "pathscope/shading/frostbite.hpp"
+#include "pathscope/shading/seen_bsdf.hpp"
 
 namespace pathscope {
 namespace {
@@ -12,24 +13,25 @@ constexpr bool k_is_delta = !std::is_same_v<Kind, Lambert> && !std::is_same_v<Ki
 
 // ---- Value and density, one overload for each kind.
 
-BsdfValue evaluate(const Lambert& surface, Vec3 outgoing, Vec3 incoming) {
-    if (!(outgoing.z > 0 && incoming.z > 0)) return {};
+BsdfValue evaluate(const Lambert& surface, const SeenBsdf& seen, Vec3 incoming) {
+    if (!(seen.outgoing.z > 0 && incoming.z > 0)) return {};
     return {surface.albedo * k_inv_pi, sample_cosine_hemisphere_pdf(incoming)};
 }
 
-BsdfValue evaluate(const StandardSurface& surface, Vec3 outgoing, Vec3 incoming) {
-    return eval_standard(surface, outgoing, incoming);
+BsdfValue evaluate(const StandardSurface&, const SeenBsdf& seen, Vec3 incoming) {
+    return seen.standard ? eval_standard(*seen.standard, incoming) : BsdfValue{};
 }
 
 template <class Delta>
-BsdfValue evaluate(const Delta&, Vec3, Vec3) {
+BsdfValue evaluate(const Delta&, const SeenBsdf&, Vec3) {
     static_assert(k_is_delta<Delta>);
     return {};
 }
 
-BsdfValue evaluate(const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {
+BsdfValue evaluate(const SeenBsdf& seen, Vec3 incoming) {
+    const Bsdf& bsdf = seen.bsdf;
     const BsdfValue value =
-        std::visit([&](const auto& surface) { return evaluate(surface, outgoing, incoming); }, bsdf.surface);
+        std::visit([&](const auto& surface) { return evaluate(surface, seen, incoming); }, bsdf.surface);
     return {value.value * bsdf.opacity, value.pdf_solid_angle * bsdf.opacity};
 }
 
@@ -92,40 +94,45 @@ BsdfSample sample_delta(const ThinGlass& surface, Vec3 outgoing, float u_lobe) {
 
 // ---- Samples of the others: a direction with its value and density.
 
-DirectionSample sample_lobes(const Lambert& surface, Vec3 outgoing, float, Vec2 u) {
+DirectionSample sample_lobes(const Lambert& surface, const SeenBsdf& seen, float, Vec2 u) {
     const Vec3 incoming = sample_cosine_hemisphere(u);
-    return {incoming, evaluate(surface, outgoing, incoming)};
+    return {incoming, evaluate(surface, seen, incoming)};
 }
 
-DirectionSample sample_lobes(const StandardSurface& surface, Vec3 outgoing, float u_lobe, Vec2 u) {
-    return sample_standard(surface, outgoing, u_lobe, u);
+DirectionSample sample_lobes(const StandardSurface&, const SeenBsdf& seen, float u_lobe, Vec2 u) {
+    return sample_standard(*seen.standard, u_lobe, u);
 }
 
 template <class Smooth>
-DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& surface, Vec3 outgoing, Vec2 u) {
+DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& surface, const SeenBsdf& seen,
+                                  Vec2 u) {
     const Vec3 incoming =
         sampling == HemisphereSampling::uniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
-    const Rgb value = evaluate(surface, outgoing, incoming).value;
-    return {incoming, {value, hemisphere_pdf(sampling, outgoing, incoming)}};
+    const Rgb value = evaluate(surface, seen, incoming).value;
+    return {incoming, {value, hemisphere_pdf(sampling, seen.outgoing, incoming)}};
 }
 
+/// Nothing if no light can come from there.
 template <class Kind>
-std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind& surface, Vec3 outgoing,
-                                         float u_lobe, Vec2 u) {
+std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind& surface,
+                                         const SeenBsdf& seen, float u_lobe, Vec2 u) {
     if constexpr (k_is_delta<Kind>) {
-        return sample_delta(surface, outgoing, u_lobe);
+        const BsdfSample sample = sample_delta(surface, seen.outgoing, u_lobe);
+        return is_zero(sample.weight) ? std::nullopt : std::optional(sample);
     } else {
-        if (!(outgoing.z > 0)) return std::nullopt;
+        std::optional<BsdfSample> sample;
+        if (!(seen.outgoing.z > 0)) return sample;
         const DirectionSample drawn = sampling == HemisphereSampling::bsdf
-                                          ? sample_lobes(surface, outgoing, u_lobe, u)
-                                          : sample_hemisphere(sampling, surface, outgoing, u);
+                                          ? sample_lobes(surface, seen, u_lobe, u)
+                                          : sample_hemisphere(sampling, surface, seen, u);
         const float pdf = drawn.value.pdf_solid_angle;
-        if (!(pdf > 0)) return std::nullopt;
-        BsdfSample sample;
-        sample.incoming = drawn.incoming;
-        sample.value = drawn.value.value;
-        sample.pdf_solid_angle = pdf;
-        sample.weight = sample.value * (sample.incoming.z / pdf);
+        const Rgb weight = drawn.value.value * (drawn.incoming.z / pdf);
+        if (!(pdf > 0) || is_zero(weight)) return sample;
+        sample.emplace();
+        sample->incoming = drawn.incoming;
+        sample->value = drawn.value.value * seen.bsdf.opacity;
+        sample->pdf_solid_angle = pdf * seen.bsdf.opacity;
+        sample->weight = weight;
         return sample;
     }
 }
@@ -137,12 +144,30 @@ bool is_specular(const Bsdf& bsdf) {
            std::visit([]<class Kind>(const Kind&) { return k_is_delta<Kind>; }, bsdf.surface);
 }
 
+BsdfValue eval_bsdf_and_pdf(HemisphereSampling sampling, const SeenBsdf& seen, Vec3 incoming) {
+    BsdfValue value = evaluate(seen, incoming);
+    if (sampling != HemisphereSampling::bsdf && !is_specular(seen.bsdf))
+        value.pdf_solid_angle = seen.bsdf.opacity * hemisphere_pdf(sampling, seen.outgoing, incoming);
+    return value;
+}
+
+std::optional<BsdfSample> sample_direction(HemisphereSampling sampling, const SeenBsdf& seen, float u_lobe,
+                                           Vec2 u) {
+    const Bsdf& bsdf = seen.bsdf;
+    if (u_lobe >= bsdf.opacity) return straight_sample(seen.outgoing, {1, 1, 1});
+    // Given that the ray meets the surface, u_lobe is uniform below the opacity: stretched, it serves again.
+    const float u_surface = std::min(u_lobe / bsdf.opacity, k_one_minus_epsilon);
+    return std::visit(
+        [&](const auto& surface) { return sample_surface(sampling, surface, seen, u_surface, u); },
+        bsdf.surface);
+}
+
 Rgb eval_bsdf(const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {
-    return evaluate(bsdf, outgoing, incoming).value;
+    return evaluate(see_bsdf(bsdf, outgoing), incoming).value;
 }
 
 float sample_bsdf_pdf(const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {
-    return evaluate(bsdf, outgoing, incoming).pdf_solid_angle;
+    return evaluate(see_bsdf(bsdf, outgoing), incoming).pdf_solid_angle;
 }
 
 std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, Vec3 outgoing, float u_lobe, Vec2 u) {
@@ -151,16 +176,7 @@ std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, Vec3 outgoing, float u_l
 
 std::optional<BsdfSample> sample_direction(HemisphereSampling sampling, const Bsdf& bsdf, Vec3 outgoing,
                                            float u_lobe, Vec2 u) {
-    if (u_lobe >= bsdf.opacity) return straight_sample(outgoing, {1, 1, 1});
-    // Given that the ray meets the surface, u_lobe is uniform below the opacity: stretched, it serves again.
-    const float u_surface = std::min(u_lobe / bsdf.opacity, k_one_minus_epsilon);
-    std::optional<BsdfSample> sample = std::visit(
-        [&](const auto& surface) { return sample_surface(sampling, surface, outgoing, u_surface, u); },
-        bsdf.surface);
-    if (!sample || is_zero(sample->weight)) return std::nullopt;
-    sample->value *= bsdf.opacity;
-    sample->pdf_solid_angle *= bsdf.opacity;
-    return sample;
+    return sample_direction(sampling, see_bsdf(bsdf, outgoing), u_lobe, u);
 }
 
 float sample_direction_pdf(HemisphereSampling sampling, const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {
@@ -168,10 +184,7 @@ float sample_direction_pdf(HemisphereSampling sampling, const Bsdf& bsdf, Vec3 o
 }
 
 BsdfValue eval_bsdf_and_pdf(HemisphereSampling sampling, const Bsdf& bsdf, Vec3 outgoing, Vec3 incoming) {
-    BsdfValue value = evaluate(bsdf, outgoing, incoming);
-    if (sampling != HemisphereSampling::bsdf && !is_specular(bsdf))
-        value.pdf_solid_angle = bsdf.opacity * hemisphere_pdf(sampling, outgoing, incoming);
-    return value;
+    return eval_bsdf_and_pdf(sampling, see_bsdf(bsdf, outgoing), incoming);
 }
 
 Rgb straight_transmission(const Bsdf& bsdf, Vec3 outgoing) {

@@ -167,4 +167,9 @@ TEST_CASE("the sign of a difference of products is exact where rounded products 
     CHECK(difference_of_products(a, b, 1, 1) == 0x1p-53 - 0x1p-105);  // 2^-52 - 2^-53 - 2^-105
     CHECK(difference_of_products(1, 1, a, b) == -(0x1p-53 - 0x1p-105));
     CHECK(difference_of_products(3, 4, 6, 2) == 0);
+    for (const double one : {1.0, -1.0})
+        for (const double zero : {0.0, -0.0}) {
+            const double difference = difference_of_products(one, zero, 1, 0.0);
+            CHECK((difference == 0 && !std::signbit(difference)));
+        }
 }

@@ -58,6 +58,16 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("four dimensions at once are the same numbers, bit for bit") {
+    for (const SamplerKind kind : k_kinds)
+        for (std::uint32_t sample = 0; sample < 1000; ++sample) {
+            const PixelSampler sampler(kind, 7, int(sample % 31), int(sample % 17), sample * 977);
+            const std::uint32_t first = sample % 13;
+            const FourPairs pairs = sampler.get_four_2d(first);
+            for (std::uint32_t i = 0; i < 4; ++i) REQUIRE(pairs[i] == sampler.get_2d(first + i));
+        }
+}
+
 TEST_CASE("Sobol's second coordinate in five steps equals its direction numbers, bit by bit") {
     // v_0 = 1/2, v_j = v_(j-1) xor v_(j-1)/2: the definition, one index bit at a time.
     HashRng rng(5);

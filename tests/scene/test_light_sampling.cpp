@@ -92,6 +92,65 @@ Scene scene_with_environment(Image picture, std::vector<LightSpec> lights = {}) 
 
 // ---- Irradiance, in closed form.
 
+TEST_CASE("an even triangle light is sampled from its own record as from the mesh, bit for bit") {
+    SceneParts parts = empty_parts();
+    Material lamp = grey();
+    lamp.ke = {3, 2, 1};
+    add_rectangle(parts, {-0.3f, 0.9f, 0.1f}, {0.7f, 0.1f, 0}, {0, 0.2f, 0.6f}, add_material(parts, lamp));
+    // Normals of the vertices that follow a curve; the geometric one is turned to their side.
+    parts.mesh.normals = {{-0.2f, -1, 0.4f}, {0.3f, -1, 0}, {0, -1, 0.1f}, {0, 0, 0}};
+    Scene scene = small_scene(std::move(parts), {EmissiveMtlSpec{false}});
+    Scene general = scene;
+    for (Light& light : general.lights.lights) {
+        auto& triangle = std::get<TriangleLight>(light);
+        REQUIRE(triangle.even);
+        triangle.even = false;
+    }
+    HashRng rng(11);
+    int lit = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const LightReference reference{{rng.next_float() - 0.5f, 1.8f * rng.next_float(), rng.next_float()},
+                                       {0, 1, 0}};
+        const float u_pick = rng.next_float();
+        const Vec2 u{rng.next_float(), rng.next_float()};
+        const auto sample = sample_light(scene, LightSampling::power, reference, u_pick, u);
+        const auto expected = sample_light(general, LightSampling::power, reference, u_pick, u);
+        REQUIRE(sample.has_value() == expected.has_value());
+        if (!sample) continue;
+        ++lit;
+        REQUIRE(sample->direction == expected->direction);
+        REQUIRE(sample->distance == expected->distance);
+        REQUIRE(sample->target.position == expected->target.position);
+        REQUIRE(sample->target.position_error == expected->target.position_error);
+        REQUIRE(sample->target.normal == expected->target.normal);
+        REQUIRE(sample->radiance == expected->radiance);
+        REQUIRE(sample->pdf_solid_angle == expected->pdf_solid_angle);
+    }
+    CHECK(lit > 500);
+    CHECK(lit < 1500);
+}
+
+TEST_CASE("a triangle light is not even where a map changes its emission, or its normal may turn over") {
+    SceneParts parts = empty_parts();
+    add_rectangle(parts, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+    Material lamp = grey();
+    lamp.ke = k_white;
+    const auto is_even = [&](const Material& material) {
+        return make_triangle_light(parts.mesh, 0, material, k_white).even;
+    };
+    CHECK(is_even(lamp));
+    Material with_map = lamp, with_holes = lamp;
+    with_map.map_ke.index = 0;
+    with_holes.map_d.index = 0;
+    CHECK_FALSE(is_even(with_map));
+    CHECK_FALSE(is_even(with_holes));
+
+    parts.mesh.normals = {{0, 0, 1}, {0, 0, 1}, {0.9f, 0, 0.1f}, {0, 0, 1}};
+    CHECK(is_even(lamp));
+    parts.mesh.normals[2] = {1, 0, -0.1f};
+    CHECK_FALSE(is_even(lamp));
+}
+
 TEST_CASE("irradiance: below a rectangle it is Lambert's form factor, at any scale") {
     for (const float scale : {1e-3f, 1.0f, 1e4f}) {
         QuadLightSpec quad = ceiling_light({3, 3, 3});

@@ -1,4 +1,5 @@
 #include "pathscope/shading/bsdf.hpp"
+#include "pathscope/shading/seen_bsdf.hpp"
 
 #include <limits>
 
@@ -99,6 +100,28 @@ TEST_CASE("reciprocity: f(wo, wi) = f(wi, wo)") {
         const Rgb forth = eval_bsdf(bsdf, o, in), back = eval_bsdf(bsdf, in, o);
         REQUIRE(largest_difference(forth, back) <= 1e-4f * max_component(forth));
     }
+}
+
+TEST_CASE("one view of a surface answers many questions as if each were the first") {
+    HashRng rng(5);
+    for (const Bsdf& bsdf : smooth_surfaces())
+        for (const HemisphereSampling lever : k_levers) {
+            const Vec3 o = direction_at(0.6f, rng.next_float());
+            const SeenBsdf seen = see_bsdf(bsdf, o);
+            for (int i = 0; i < 100; ++i) {
+                const float u_lobe = rng.next_float();
+                const Vec2 u = next_2d(rng);
+                const auto sample = sample_direction(lever, seen, u_lobe, u);
+                const auto expected = sample_direction(lever, bsdf, o, u_lobe, u);
+                REQUIRE(sample.has_value() == expected.has_value());
+                if (!sample) continue;
+                REQUIRE(sample->incoming == expected->incoming);
+                REQUIRE(sample->weight == expected->weight);
+                const BsdfValue value = eval_bsdf_and_pdf(lever, seen, sample->incoming);
+                REQUIRE(value.value == expected->value);
+                REQUIRE(value.pdf_solid_angle == expected->pdf_solid_angle);
+            }
+        }
 }
 
 TEST_CASE("nothing is reflected below the surface, and nothing seen from there") {

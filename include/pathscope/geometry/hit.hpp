@@ -45,14 +45,58 @@ struct SurfacePoint {
     std::uint32_t material = 0;
 };
 
-/// Requires: the hit is of a triangle of this mesh that is not degenerate.
-[[nodiscard]] SurfacePoint surface_point(const Mesh& mesh, const Hit& hit);
-
 /// Texture coordinates alone, for the cut-out test inside the traversal.
 [[nodiscard]] inline Vec2 interpolate_uv(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
     if (mesh.uvs.empty()) return {};
     const TriangleIndices& i = mesh.triangles[triangle];
     return mesh.uvs[i.a] * (1 - u - v) + mesh.uvs[i.b] * u + mesh.uvs[i.c] * v;
+}
+
+/// (1 - u - v) a + u b + v c. With weights in double 1 - u - v is exact, so that the point stays in the plane.
+[[nodiscard]] inline Vec3 exact_point(const TriangleCorners& t, double u, double v) {
+    return to_float((1 - u - v) * to_double(t.a) + u * to_double(t.b) + v * to_double(t.c));
+}
+
+/// The bound for such a point. Requires: longest_side of the triangle's box.
+[[nodiscard]] inline Vec3 position_error(Vec3 position, float longest_side) {
+    const float rounding_in_double = 0x1p-32f * longest_side;
+    return abs(position) * 0x1p-24f + Vec3{rounding_in_double, rounding_in_double, rounding_in_double};
+}
+
+[[nodiscard]] inline float longest_side(const TriangleCorners& t) {
+    return max_component(max(max(t.a, t.b), t.c) - min(min(t.a, t.b), t.c));
+}
+
+/// Fills in both normals where the mesh has normals at its vertices; geometric_normal is that of the winding before.
+inline void interpolate_normals(const Mesh& mesh, const Hit& hit, SurfacePoint& point) {
+    const auto facing = [](Vec3 n, Vec3 side) { return dot(n, side) < 0 ? -n : n; };
+    const TriangleIndices& i = mesh.triangles[hit.triangle];
+    Vec3 a = mesh.normals[i.a], b = mesh.normals[i.b], c = mesh.normals[i.c];
+
+    // A corner without a normal takes the geometric one, on the side of those that have one.
+    point.geometric_normal = facing(point.geometric_normal, a + b + c);
+    for (Vec3* n : {&a, &b, &c})
+        if (is_zero(*n)) *n = point.geometric_normal;
+
+    // Within the triangle the interpolated normal can still tip over the plane; the geometric one goes with it.
+    const Vec3 interpolated = a * (1 - hit.u - hit.v) + b * hit.u + c * hit.v;
+    const float size = length(interpolated);
+    point.shading_normal = size > 0 ? interpolated / size : point.geometric_normal;
+    point.geometric_normal = facing(point.geometric_normal, point.shading_normal);
+}
+
+/// Requires: the hit is of a triangle of this mesh that is not degenerate.
+[[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const Hit& hit) {
+    const TriangleCorners triangle = corners(mesh, hit.triangle);
+    SurfacePoint point;
+    point.triangle = hit.triangle;
+    point.material = mesh.material_of(hit.triangle);
+    point.position = exact_point(triangle, hit.u, hit.v);
+    point.position_error = position_error(point.position, longest_side(triangle));
+    point.uv = interpolate_uv(mesh, hit.triangle, hit.u, hit.v);
+    point.geometric_normal = point.shading_normal = geometric_normal(triangle);
+    if (!mesh.normals.empty()) interpolate_normals(mesh, hit, point);
+    return point;
 }
 
 }  // namespace pathscope

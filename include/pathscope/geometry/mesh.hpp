@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "pathscope/core/result.hpp"
+#include "pathscope/geometry/double_vec.hpp"
 #include "pathscope/math/box.hpp"
 #include "pathscope/math/vec.hpp"
 
@@ -56,14 +57,33 @@ struct TriangleCorners {
     return {mesh.positions[i.a], mesh.positions[i.b], mesh.positions[i.c]};
 }
 
+/// Twice the area times the normal. Exact zero for degenerate triangles: differences of floats are exact in double
+/// (unless 2^29 apart in size), and so is the comparison of their products.
+[[nodiscard]] inline DoubleVec area_vector(const TriangleCorners& t) {
+    const DoubleVec p = to_double(t.b) - to_double(t.a);
+    const DoubleVec q = to_double(t.c) - to_double(t.a);
+    return {difference_of_products(p.y, q.z, p.z, q.y), difference_of_products(p.z, q.x, p.x, q.z),
+            difference_of_products(p.x, q.y, p.y, q.x)};
+}
+
 /// True if the corners lie on one line or in one point: no area, no normal, never hit.
-[[nodiscard]] bool is_degenerate(const TriangleCorners& triangle);
+[[nodiscard]] inline bool is_degenerate(const TriangleCorners& triangle) {
+    const DoubleVec n = area_vector(triangle);
+    return n.x == 0 && n.y == 0 && n.z == 0;
+}
 
 /// Of length one; the zero vector for a degenerate triangle. Computed in double, so that slivers and scenes of
 /// any size have one.
-[[nodiscard]] Vec3 geometric_normal(const TriangleCorners& triangle);
+[[nodiscard]] inline Vec3 geometric_normal(const TriangleCorners& triangle) {
+    const DoubleVec n = area_vector(triangle);
+    const double size = length(n);
+    if (size == 0) return {};
+    return to_float(1 / size * n);
+}
 
-[[nodiscard]] float area(const TriangleCorners& triangle);
+[[nodiscard]] inline float area(const TriangleCorners& triangle) {
+    return float(0.5 * length(area_vector(triangle)));
+}
 
 [[nodiscard]] inline Box bounds(const TriangleCorners& triangle) {
     Box box;

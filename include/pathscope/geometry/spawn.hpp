@@ -31,7 +31,8 @@ inline constexpr float k_offset_safety = 4;
 /// length one; error >= 0, with the rounding of the position itself included (hit.hpp).
 [[nodiscard]] inline Vec3 offset_origin(Vec3 position, Vec3 error, Vec3 geometric_normal, Vec3 direction) {
     const float distance = k_offset_safety * dot(abs(geometric_normal), error);
-    return position + geometric_normal * (dot(direction, geometric_normal) >= 0 ? distance : -distance);
+    const float side = dot(direction, geometric_normal) + 0.0f;  // Makes -0 +0.
+    return position + geometric_normal * std::copysign(distance, side);
 }
 
 /// Requires: direction of length one.
@@ -50,7 +51,19 @@ struct RayTarget {
 
 /// The segment between the two surfaces, for visibility: whatever it hits stands between them. Where the two are
 /// closer than their errors the segment is empty (t_max < t_min) and nothing stands between.
-[[nodiscard]] Ray spawn_ray_to(const SurfacePoint& point, const RayTarget& target);
+[[nodiscard]] inline Ray spawn_ray_to(const SurfacePoint& point, const RayTarget& target) {
+    const Vec3 between = target.position - point.position;
+    const Vec3 origin = offset_origin(point.position, point.position_error, point.geometric_normal, between);
+
+    // At the far end the ray has drifted by the rounding of its direction and length, a share of the distance.
+    const Vec3 target_error = target.position_error + abs(between) * 0x1p-22f;
+    const Vec3 end = offset_origin(target.position, target_error, target.normal, -between);
+
+    const Vec3 segment = end - origin;
+    const float distance = length(segment);
+    if (!(dot(segment, between) > 0)) return {origin, point.geometric_normal, 0, -1};
+    return {origin, segment / distance, 0, distance};
+}
 
 [[nodiscard]] inline Ray spawn_ray_to(const SurfacePoint& point, const SurfacePoint& target) {
     return spawn_ray_to(point, RayTarget{target.position, target.position_error, target.geometric_normal});

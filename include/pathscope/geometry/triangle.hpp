@@ -28,6 +28,7 @@
 #include <array>
 #include <optional>
 
+#include "pathscope/geometry/double_vec.hpp"
 #include "pathscope/geometry/mesh.hpp"
 #include "pathscope/math/ray.hpp"
 
@@ -71,15 +72,6 @@ struct TriangleHit {
 
 // ---------------------------------------------------------------------------------------------------------------
 // Inline, because it runs about ten times per ray.
-
-/// a b - c d with the exact sign: zero only where it is zero in real numbers.
-[[nodiscard]] inline double difference_of_products(double a, double b, double c, double d) {
-    const double ab = a * b;
-    const double cd = c * d;
-    if (ab != cd) [[likely]]
-        return ab - cd;
-    return std::fma(a, b, -ab) - std::fma(c, d, -cd);
-}
 
 inline TriangleRay::TriangleRay(const Ray& ray) : t_min(ray.t_min) {
     const Vec3 size = abs(ray.direction);

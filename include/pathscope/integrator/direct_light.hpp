@@ -13,6 +13,7 @@
 /// Thread safety: pure; `rays` is the caller's.
 /// Test: tests/integrator/test_direct_light.cpp (form factor)    Lesson: lessons/04-light-sampling
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -29,8 +30,7 @@ namespace pathscope {
     if (!light || !is_consistent(vertex.shaded, light->direction)) return {};
 
     const Vec3 incoming = vertex.shaded.frame.to_local(light->direction);
-    const BsdfValue bsdf =
-        eval_bsdf_and_pdf(settings.hemisphere, vertex.shaded.bsdf, vertex.outgoing, incoming);
+    const BsdfValue bsdf = eval_bsdf_and_pdf(settings.hemisphere, vertex.seen, incoming);
     if (is_zero(bsdf.value)) return {};
     ++rays;
     if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
@@ -50,9 +50,7 @@ namespace pathscope {
     Rgb sum;
     for (int i = 0; i < settings.light_samples; ++i) {
         const float shift = float(i) / float(settings.light_samples);
-        const auto turned = [shift](float u) {
-            return u + shift < 1 ? u + shift : std::max(u + shift - 1, 0.0f);
-        };
+        const auto turned = [shift](float u) { return u + shift - std::floor(u + shift); };
         sum +=
             one_light_sample(scene, settings, vertex, turned(u_pick), {turned(u_point.x), u_point.y}, rays);
     }

@@ -16,6 +16,7 @@
 #include "pathscope/scene/light_sampling.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "pathscope/scene/surface.hpp"
+#include "pathscope/shading/seen_bsdf.hpp"
 
 namespace pathscope {
 
@@ -23,16 +24,18 @@ namespace pathscope {
 inline constexpr std::uint32_t k_pixel_dimension = 0;
 
 /// The random numbers of one bounce, each decision with a dimension of its own: whoever skips a decision (the direct
-/// pass plays no roulette) leaves the others as they are.
+/// pass plays no roulette) leaves the others as they are. The four that nearly every vertex needs are made together.
 class BounceSample {
   public:
     BounceSample(const PixelSampler& sampler, int bounce)
-        : sampler_(&sampler), base_(1 + k_decisions * std::uint32_t(bounce)) {}
+        : sampler_(&sampler),
+          base_(1 + k_decisions * std::uint32_t(bounce)),
+          pairs_(sampler.get_four_2d(base_)) {}
 
-    [[nodiscard]] float light_pick() const { return sampler_->get_1d(base_); }
-    [[nodiscard]] Vec2 light_point() const { return sampler_->get_2d(base_ + 1); }
-    [[nodiscard]] float lobe() const { return sampler_->get_1d(base_ + 2); }
-    [[nodiscard]] Vec2 direction() const { return sampler_->get_2d(base_ + 3); }
+    [[nodiscard]] float light_pick() const { return pairs_.x[0]; }
+    [[nodiscard]] Vec2 light_point() const { return pairs_[1]; }
+    [[nodiscard]] float lobe() const { return pairs_.x[2]; }
+    [[nodiscard]] Vec2 direction() const { return pairs_[3]; }
     [[nodiscard]] float roulette() const { return sampler_->get_1d(base_ + 4); }
 
   private:
@@ -40,12 +43,13 @@ class BounceSample {
 
     const PixelSampler* sampler_;
     std::uint32_t base_;
+    FourPairs pairs_;
 };
 
 struct Vertex {
     SurfacePoint point;
     ShadedPoint shaded;
-    Vec3 outgoing;          ///< Local.
+    SeenBsdf seen;          ///< Along `outgoing`, local: shared by all samples taken here.
     bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
 
     [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
@@ -53,10 +57,9 @@ struct Vertex {
 
 /// Requires: outgoing of length one, in world space.
 [[nodiscard]] inline Vertex make_vertex(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
-    Vertex vertex{hit.point, shade_point(scene, hit, outgoing), {}, false};
-    vertex.outgoing = vertex.shaded.frame.to_local(outgoing);
-    vertex.specular = is_specular(vertex.shaded.bsdf);
-    return vertex;
+    const ShadedPoint shaded = shade_point(scene, hit, outgoing);
+    return {hit.point, shaded, see_bsdf(shaded.bsdf, shaded.frame.to_local(outgoing)),
+            is_specular(shaded.bsdf)};
 }
 
 /// What a ray leaves, as far as the light that it runs into must know: by which density its direction was drawn.
@@ -77,15 +80,17 @@ struct NextDirection {
 [[nodiscard]] inline std::optional<NextDirection> sample_next_direction(const TransportSettings& settings,
                                                                         const Vertex& vertex,
                                                                         const BounceSample& random) {
-    const std::optional<BsdfSample> sample = sample_direction(
-        settings.hemisphere, vertex.shaded.bsdf, vertex.outgoing, random.lobe(), random.direction());
-    if (!sample) return std::nullopt;
+    std::optional<NextDirection> next;
+    const std::optional<BsdfSample> sample =
+        sample_direction(settings.hemisphere, vertex.seen, random.lobe(), random.direction());
+    if (!sample) return next;
     const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
-    if (!is_consistent(vertex.shaded, direction)) return std::nullopt;
-    return NextDirection{
-        direction,
-        sample->weight,
-        {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular}};
+    if (!is_consistent(vertex.shaded, direction)) return next;
+    next.emplace();
+    next->direction = direction;
+    next->weight = sample->weight;
+    next->origin = {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular};
+    return next;
 }
 
 }  // namespace pathscope

@@ -7,12 +7,21 @@
 ///         multiply-add with odd constants before it.
 /// Test: tests/math/test_math.cpp (bit balance, avalanche)
 
+#include <concepts>
 #include <cstdint>
+#include <type_traits>
 
 namespace pathscope {
 
+/// Four 32-bit numbers for one instruction: what is written for one number can be asked for four.
+using FourBits = std::uint32_t __attribute__((vector_size(16)));
+
+template <class T>
+concept Bits = std::same_as<T, std::uint32_t> || std::same_as<T, FourBits>;
+
 /// A bijection of 32-bit numbers that spreads each input bit over all output bits.
-[[nodiscard]] constexpr std::uint32_t hash_u32(std::uint32_t x) {
+template <Bits T>
+[[nodiscard]] constexpr T hash_u32(T x) {
     x ^= x >> 16;
     x *= 0x7feb352du;
     x ^= x >> 15;
@@ -22,7 +31,8 @@ namespace pathscope {
 }
 
 /// Mixes a further value into a hash; the order of arguments matters.
-[[nodiscard]] constexpr std::uint32_t hash_combine(std::uint32_t hash, std::uint32_t value) {
+template <Bits T>
+[[nodiscard]] constexpr T hash_combine(T hash, std::type_identity_t<T> value) {
     return hash_u32(hash * 0x9e3779b1u + value + 0x7f4a7c15u);
 }
 

@@ -25,7 +25,9 @@
 /// Thread safety: a value.   Test: tests/sampling/test_sampler.cpp
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/math/random.hpp"
@@ -42,19 +44,22 @@ constexpr const auto& enum_table(SamplerKind) { return k_sampler_names; }
 
 inline constexpr std::uint32_t k_sequence_samples = 1u << 18;
 
-[[nodiscard]] constexpr std::uint32_t reverse_bits(std::uint32_t x) {
+template <Bits T>
+[[nodiscard]] constexpr T reverse_bits(T x) {
     x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
     x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
     x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
-    return __builtin_bswap32(x);
+    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
+    return (x >> 16) | (x << 16);
 }
 
 /// Owen's scramble of a number whose bits stand in reversed order: flips each bit by a hash of the bits below
 /// it. Every step is a sum or a product of x, and those carry only upwards.
-[[nodiscard]] constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t key) {
+template <Bits T>
+[[nodiscard]] constexpr T scramble_reversed(T x, std::type_identity_t<T> key) {
     x ^= x * 0x3d20adeau;
     x += key;
-    x *= (key >> 16) | 1;
+    x *= (key >> 16) | 1u;
     x ^= x * 0x05526c56u;
     x ^= x * 0x53a22864u;
     return x;
@@ -64,7 +69,8 @@ inline constexpr std::uint32_t k_sequence_samples = 1u << 18;
 /// Its generator matrix is Pascal's triangle modulo 2: output bit i is the parity of all index bits j whose
 /// number contains i (Lucas: C(j, i) is odd iff the bits of i are among those of j). That parity over
 /// supersets takes one step for each of the five bits of j, not one for each j.
-[[nodiscard]] constexpr std::uint32_t sobol_second_reversed(std::uint32_t index) {
+template <Bits T>
+[[nodiscard]] constexpr T sobol_second_reversed(T index) {
     index ^= (index & 0xffff0000u) >> 16;
     index ^= (index & 0xff00ff00u) >> 8;
     index ^= (index & 0xf0f0f0f0u) >> 4;
@@ -73,28 +79,40 @@ inline constexpr std::uint32_t k_sequence_samples = 1u << 18;
     return index;
 }
 
+/// The pairs of four dimensions: x[i], y[i] belong to the i-th.
+struct FourPairs {
+    alignas(16) std::array<float, 4> x, y;
+
+    [[nodiscard]] Vec2 operator[](std::size_t i) const { return {x[i], y[i]}; }
+};
+
 class PixelSampler {
   public:
     PixelSampler(SamplerKind kind, std::uint32_t seed, int x, int y, std::uint32_t sample)
-        : kind_(kind), sample_(sample % k_sequence_samples) {
-        const std::uint32_t sequence_seed = seed + sample / k_sequence_samples * k_sequence_salt;
-        pixel_key_ = hash_combine(hash_combine(hash_u32(sequence_seed), std::uint32_t(x)), std::uint32_t(y));
-    }
+        : kind_(kind),
+          sample_(sample % k_sequence_samples),
+          reversed_sample_(reverse_bits(sample_)),
+          pixel_key_(hash_combine(
+              hash_combine(hash_u32(seed + sample / k_sequence_samples * k_sequence_salt), std::uint32_t(x)),
+              std::uint32_t(y))) {}
 
     [[nodiscard]] float get_1d(std::uint32_t dimension) const {
-        const std::uint32_t key = hash_combine(pixel_key_, dimension);
-        if (kind_ == SamplerKind::independent) return to_unit_float(hash_combine(key, sample_));
-        return sobol_first(shuffled_index(key), key);
+        return to_unit_float(pair(hash_combine(pixel_key_, dimension)).first);
     }
 
     [[nodiscard]] Vec2 get_2d(std::uint32_t dimension) const {
-        const std::uint32_t key = hash_combine(pixel_key_, dimension);
-        if (kind_ == SamplerKind::independent) {
-            const std::uint32_t first = hash_combine(key, sample_);
-            return {to_unit_float(first), to_unit_float(hash_combine(first, k_second_salt))};
-        }
-        const std::uint32_t index = shuffled_index(key);
-        return {sobol_first(index, key), sobol_second(index, key)};
+        const auto bits = pair(hash_combine(pixel_key_, dimension));
+        return {to_unit_float(bits.first), to_unit_float(bits.second)};
+    }
+
+    /// get_2d(first), ... get_2d(first + 3), for the price of one and a half.
+    [[nodiscard]] FourPairs get_four_2d(std::uint32_t first) const {
+        const FourBits dimensions = FourBits{0, 1, 2, 3} + first;
+        const auto bits = pair(hash_combine(FourBits{} + pixel_key_, dimensions));
+        FourPairs pairs;
+        for (std::size_t i = 0; i < 4; ++i) pairs.x[i] = to_unit_float(bits.first[i]);
+        for (std::size_t i = 0; i < 4; ++i) pairs.y[i] = to_unit_float(bits.second[i]);
+        return pairs;
     }
 
   private:
@@ -102,20 +120,28 @@ class PixelSampler {
     static constexpr std::uint32_t k_second_salt = 0x68bc21ebu;
     static constexpr std::uint32_t k_first_salt = 0x02e5be93u;
 
-    /// Permutes the samples so that the first 2^k of them stay an aligned run of the sequence, for every k.
-    [[nodiscard]] std::uint32_t shuffled_index(std::uint32_t key) const {
-        return reverse_bits(scramble_reversed(reverse_bits(sample_), key));
-    }
-    [[nodiscard]] static float sobol_first(std::uint32_t index, std::uint32_t key) {
-        return to_unit_float(reverse_bits(scramble_reversed(index, hash_combine(key, k_first_salt))));
-    }
-    [[nodiscard]] static float sobol_second(std::uint32_t index, std::uint32_t key) {
-        const std::uint32_t reversed = sobol_second_reversed(index);
-        return to_unit_float(reverse_bits(scramble_reversed(reversed, hash_combine(key, k_second_salt))));
+    template <Bits T>
+    struct Pair {
+        T first, second;
+    };
+
+    /// The pair of one dimension, or those of four, by the key made from pixel and dimension.
+    template <Bits T>
+    [[nodiscard]] Pair<T> pair(T key) const {
+        if (kind_ == SamplerKind::independent) {
+            const T first = hash_combine(key, T{} + sample_);
+            return {first, hash_combine(first, T{} + k_second_salt)};
+        }
+        // Permutes the samples so that the first 2^k of them stay an aligned run of the sequence, for every k.
+        const T index = reverse_bits(scramble_reversed(T{} + reversed_sample_, key));
+        const auto scrambled = [&](T reversed, std::uint32_t salt) {
+            return reverse_bits(scramble_reversed(reversed, hash_combine(key, T{} + salt)));
+        };
+        return {scrambled(index, k_first_salt), scrambled(sobol_second_reversed(index), k_second_salt)};
     }
 
     SamplerKind kind_;
-    std::uint32_t sample_;
+    std::uint32_t sample_, reversed_sample_;
     std::uint32_t pixel_key_;
 };
 

@@ -21,6 +21,7 @@
 /// sample.pdf_solid_angle, up to rounding; MIS relies on it. Deltas have no such density and are never met.
 /// Thread safety: pure.   Test: tests/scene/test_light_sampling.cpp     Lesson: lessons/04-light-sampling
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -54,6 +55,9 @@ struct LightSample {
                                            const LightReference& reference, Vec3 direction);
 
 /// The ray that must meet nothing for the light to arrive.
-[[nodiscard]] Ray shadow_ray(const SurfacePoint& from, const LightSample& sample);
+[[nodiscard]] inline Ray shadow_ray(const SurfacePoint& from, const LightSample& sample) {
+    return std::isinf(sample.distance) ? spawn_ray(from, sample.direction)
+                                       : spawn_ray_to(from, sample.target);
+}
 
 }  // namespace pathscope

@@ -30,10 +30,12 @@
 #include <vector>
 
 #include "pathscope/core/enum_names.hpp"
+#include "pathscope/geometry/mesh.hpp"
 #include "pathscope/math/vec.hpp"
 #include "pathscope/sampling/distribution.hpp"
 #include "pathscope/scene/environment.hpp"
 #include "pathscope/scene/light_tree.hpp"
+#include "pathscope/scene/material.hpp"
 
 namespace pathscope {
 
@@ -51,6 +53,13 @@ struct TriangleLight {
     float area = 0;
     Rgb mean_radiance;      ///< For its power; emission itself is looked up at each point (map_ke, cut-outs).
     bool two_sided = true;  ///< Otherwise it emits on the side of its normal only.
+
+    /// True if normal and emission are the same at each of its points. Then all that sampling needs to know lies here, in
+    /// one place of memory, and mean_radiance is the radiance; else the mesh and the maps are asked at each point.
+    bool even = false;
+    TriangleCorners corners{};
+    Vec3 normal{};  ///< As surface_point() gives it.
+    float longest_side = 0;
 };
 
 /// A sphere that emits the same radiance everywhere, outwards, and is black inside.
@@ -75,6 +84,10 @@ struct SunLight {
 
     [[nodiscard]] bool is_delta() const { return one_minus_cos == 0; }
 };
+
+/// Requires: the triangle is not degenerate; its material emits.
+[[nodiscard]] TriangleLight make_triangle_light(const Mesh& mesh, std::uint32_t triangle,
+                                                const Material& material, Rgb mean_radiance);
 
 /// Requires: to_sun not zero; angle_deg, the angular diameter, in [0, 180].
 [[nodiscard]] SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg);

@@ -25,9 +25,6 @@ struct ShadedPoint {
     Vec3 geometric_normal;  ///< On the side of the frame's z.
 };
 
-/// Requires: outgoing of length one.
-[[nodiscard]] ShadedPoint shade_point(const Scene& scene, const SceneHit& hit, Vec3 outgoing);
-
 /// The BSDF alone, textures looked up.
 [[nodiscard]] Bsdf make_bsdf(const Scene& scene, const SceneHit& hit);
 
@@ -38,7 +35,34 @@ struct ShadedPoint {
 
 /// The shading normal, bent if need be. `geometric` must be on its side: dot(shading, geometric) >= 0.
 /// Ensures: dot(result, outgoing) has the sign of dot(geometric, outgoing); result of length one.
-[[nodiscard]] Vec3 bend_normal(Vec3 shading, Vec3 geometric, Vec3 outgoing);
+[[nodiscard]] inline Vec3 bend_normal(Vec3 shading, Vec3 geometric, Vec3 outgoing) {
+    // On the viewer's side of the triangle; turned back at the end.
+    const float side = dot(geometric, outgoing) >= 0 ? 1.0f : -1.0f;
+    const Vec3 n = shading * side, surface = geometric * side;
+    const Vec3 mirrored = reflect(outgoing, n);
+
+    // How far above the triangle the mirror direction must stay. On a flat triangle it is as far above as
+    // `outgoing`, and is never bent.
+    const float height = dot(outgoing, surface);
+    const float least = std::min(0.01f, 0.5f * height);
+    const float below = least - dot(mirrored, surface);
+    if (below <= 0) return shading;
+    const Vec3 raised = normalize(mirrored + surface * below);
+    const Vec3 between = outgoing + raised;
+    return is_zero(between) ? geometric : normalize(between) * side;
+}
+
+/// Requires: outgoing of length one.
+[[nodiscard]] inline ShadedPoint shade_point(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
+    ShadedPoint point{make_bsdf(scene, hit), {}, hit.point.geometric_normal};
+    Vec3 normal = bend_normal(hit.point.shading_normal, point.geometric_normal, outgoing);
+    if (!has_inside(point.bsdf) && dot(point.geometric_normal, outgoing) < 0) {
+        normal = -normal;
+        point.geometric_normal = -point.geometric_normal;
+    }
+    point.frame = Frame::around(normal);
+    return point;
+}
 
 /// Colour of the surface for filter guides and the albedo buffer.
 [[nodiscard]] Rgb surface_albedo(const Scene& scene, const SceneHit& hit, Vec3 outgoing);

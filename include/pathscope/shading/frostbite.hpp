@@ -32,6 +32,7 @@
 #include <algorithm>
 
 #include "pathscope/math/vec.hpp"
+#include "pathscope/shading/albedo_table.hpp"
 #include "pathscope/shading/bsdf.hpp"
 #include "pathscope/shading/microfacet.hpp"
 
@@ -45,8 +46,31 @@ namespace pathscope {
     return std::clamp(50 * 0.33f * (f0.x + f0.y + f0.z), 0.0f, 1.0f);
 }
 
+/// What coat and base do with light leaving (or, by reciprocity, arriving) along one direction.
+struct StandardShare {
+    Rgb specular;             ///< E_s: albedo of the coat.
+    Rgb diffuse_limit;        ///< L: the largest base colour that the rest of the light allows.
+    float white_diffuse = 0;  ///< E_d: albedo of the diffuse lobe over a white base.
+};
+
+/// The material as seen along one direction: what all that is asked along it has in common.
+struct StandardView {
+    StandardSurface surface;
+    Vec3 outgoing;
+    float alpha;
+    float f90;
+    AlbedoRow albedos;
+    StandardShare share;         ///< Along `outgoing`.
+    float specular_probability;  ///< Of the coat, in sample_standard.
+    float stretched_length;      ///< t(wo) of microfacet.hpp.
+    float facets_over_pdf;       ///< 2 (k cos_o + t(wo)): what turns D into the density of a reflection.
+
+    /// Requires: outgoing.z >= 0.
+    StandardView(const StandardSurface& surface, Vec3 outgoing);
+};
+
 /// Value without the cosine, and density of sample_standard. Zero unless both directions have z > 0.
-[[nodiscard]] BsdfValue eval_standard(const StandardSurface& surface, Vec3 outgoing, Vec3 incoming);
+[[nodiscard]] BsdfValue eval_standard(const StandardView& view, Vec3 incoming);
 
 /// Draws a reflection about a visible facet or a cosine-distributed direction, each as often as its lobe's
 /// share of the light reflected towards `outgoing`; value and density as eval_standard gives them. Where the
@@ -56,8 +80,7 @@ struct DirectionSample {
     Vec3 incoming;
     BsdfValue value;
 };
-[[nodiscard]] DirectionSample sample_standard(const StandardSurface& surface, Vec3 outgoing, float u_lobe,
-                                              Vec2 u);
+[[nodiscard]] DirectionSample sample_standard(const StandardView& view, float u_lobe, Vec2 u);
 
 /// Directional albedo from the table; see guide_albedo().
 [[nodiscard]] Rgb standard_albedo(const StandardSurface& surface, Vec3 outgoing);

@@ -39,9 +39,12 @@ inline constexpr float k_min_alpha = 1e-3f;
     return std::sqrt(square(alpha) * (square(w.x) + square(w.y)) + square(w.z));
 }
 
+/// The stretched length is that of `outgoing`.
+[[nodiscard]] inline float ggx_visibility(Vec3 outgoing, float stretched_length, Vec3 incoming, float alpha) {
+    return 0.5f / (outgoing.z * ggx_stretched_length(incoming, alpha) + incoming.z * stretched_length);
+}
 [[nodiscard]] inline float ggx_visibility(Vec3 outgoing, Vec3 incoming, float alpha) {
-    return 0.5f / (outgoing.z * ggx_stretched_length(incoming, alpha) +
-                   incoming.z * ggx_stretched_length(outgoing, alpha));
+    return ggx_visibility(outgoing, ggx_stretched_length(outgoing, alpha), incoming, alpha);
 }
 
 // ---- Sampling reflections about the normals that `outgoing` sees.
@@ -72,10 +75,15 @@ inline constexpr float k_min_alpha = 1e-3f;
     return reflect(outgoing, normal);
 }
 
+/// 2 (k cos_o + t(wo)): D(h) over this is the density of a reflection. The stretched length is that of `outgoing`.
+[[nodiscard]] inline float ggx_facets_over_pdf(Vec3 outgoing, float stretched_length, float alpha) {
+    return 2 * (ggx_cap_bound(outgoing, alpha) * outgoing.z + stretched_length);
+}
+
 /// pdf_solid_angle = D(h) / (2 (k cos_o + t(wo))), where incoming.z > 0; half is that of the two directions.
 [[nodiscard]] inline float sample_ggx_reflection_pdf(Vec3 outgoing, Vec3 half, float alpha) {
     return ggx_distribution(half, alpha) /
-           (2 * (ggx_cap_bound(outgoing, alpha) * outgoing.z + ggx_stretched_length(outgoing, alpha)));
+           ggx_facets_over_pdf(outgoing, ggx_stretched_length(outgoing, alpha), alpha);
 }
 
 }  // namespace pathscope
