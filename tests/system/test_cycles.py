@@ -21,7 +21,7 @@ import pictures  # noqa: E402
 import scene_model  # noqa: E402
 
 PATIENCE_S = 600
-FILE_KEYS = {"bench", "machine", "commit", "build", "runs", "peer", "rows", "ratios", "agreement"}
+FILE_KEYS = {"bench", "machine", "commit", "build", "runs", "peer", "levers", "rows", "ratios", "agreement"}
 ROW_KEYS = {"scene", "renderer", "spp", "bounces", "width", "height", "threads", "reference_spp", "samples_per_cpu_s", "cpu_s",
             "process_cpu_s", "rel_mse", "rel_mse_all", "rel_mse_median", "error_x_time"}
 RATIOS = {"samples_per_cpu_s", "rel_mse", "error_x_time"}
@@ -144,7 +144,7 @@ class Refusals(Folder):
     def test_options(self):
         scene = ("--scene", "scenes/cornell/scene.json")
         for words, named in (((), "--scene"), (("--scene", "nowhere.json"), "nowhere.json"), ((*scene, "--size", "32"), "--size"),
-                             ((*scene, "--spp", 1), "--spp"), ((*scene, "--bounces", 0), "--bounces"),
+                             ((*scene, "--spp", 1), "--spp"), ((*scene, "--lever", "seed=3"), "--lever"), ((*scene, "--bounces", 0), "--bounces"),
                              ((*scene, "--spp", 4, "--spp", 8), "--spp"), ((*scene, "--json", "no/where.json"), "no/where.json")):
             with self.subTest(words):
                 self.refused(compare(*words), named)
