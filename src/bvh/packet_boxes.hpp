@@ -34,7 +34,8 @@ struct PacketBoxRays {
     PacketBoxRays(const PacketRays& packet, const PacketBounds& bounds, float error)
         : slabs{slab(bounds, error, 0), slab(bounds, error, 1), slab(bounds, error, 2)},
           t_min(broadcast(bounds.t_min)),
-          test_each(!bounds.one_origin || slabs[0].mixed || slabs[1].mixed || slabs[2].mixed),
+          test_each(!bounds.one_origin || bounds.spread() > k_most_spread || slabs[0].mixed ||
+                    slabs[1].mixed || slabs[2].mixed),
           rays(packet) {
         if (!test_each) return;
         for (std::size_t axis = 0; axis < 3; ++axis)

@@ -9,6 +9,7 @@ inline namespace PATHSCOPE_SIMD {
 inline constexpr std::size_t k_group = 16;      ///< Rays in a register.
 inline constexpr float k_most_reach = 0x1p40f;  ///< See BlockEdges.
 inline constexpr float k_most_steep = 2;
+inline constexpr float k_most_spread = 0.015f;  ///< Beyond it intervals tell little.
 
 /// Calls step(first) for each group of rays.
 template <class Step>
@@ -81,6 +82,12 @@ struct PacketBounds {
         for (const auto& [low, high] : directions) most = std::max({most, high, -low});
         return most;
     }
+    /// The widest interval of directions, as an angle.
+    [[nodiscard]] float spread() const {
+        float most = 0;
+        for (const auto& [low, high] : directions) most = std::max(most, high - low);
+        return most / steepest();
+    }
     /// How far the scene lies from any of the origins, along any axis.
     [[nodiscard]] float reach(const Box& scene) const {
         float most = 0;
@@ -91,8 +98,10 @@ struct PacketBounds {
     }
 };
 
-/// Whether the errors of packets are within the bounds that their tests are made for.
+/// Whether the rays go together: directions that differ in sign along two axes have little in common, and errors must be
+/// within the bounds that the tests of packets are made for.
 [[nodiscard]] inline bool suits_packet(const PacketRays& rays, const PacketBounds& bounds, float reach) {
+    if (bounds.mixed(0) + bounds.mixed(1) + bounds.mixed(2) > 1) return false;
     if (!(reach < k_most_reach && bounds.steepest() <= k_most_steep)) return false;
     // 1/d of 0 needs a single ray's care.
     for (std::size_t axis = 0; axis < 3; ++axis)
