@@ -55,6 +55,33 @@ TEST_CASE("arithmetic is that of single floats and doubles, lane by lane") {
     }
 }
 
+TEST_CASE("sixteen floats are sixteen single ones") {
+    HashRng rng(4);
+    for (int round = 0; round < 1000; ++round) {
+        alignas(64) std::array<float, 16> a, b, ratio, chosen, least_of, greatest_of, about;
+        for (std::size_t i = 0; i < 16; ++i) a[i] = rng.next_float() - 0.5f, b[i] = rng.next_float() - 0.5f;
+        const Float16 x = load16(a.data()), y = load16(b.data());
+        const Lanes lanes = rng.next_u32() & 0xffff;
+        store(ratio.data(), (x + y) / (x - broadcast16(2)));
+        store(chosen.data(), select(lanes, x, y));
+        store(least_of.data(), min(x, y));
+        store(greatest_of.data(), max(x, y));
+        store(about.data(), about_multiply_add(x, y, x));
+        CHECK(least(x) == *std::min_element(a.begin(), a.end()));
+        CHECK(greatest(x) == *std::max_element(a.begin(), a.end()));
+        const Lanes at_most_lanes = at_most(x, y);
+        for (std::size_t i = 0; i < 16; ++i) {
+            CHECK(ratio[i] == (a[i] + b[i]) / (a[i] - 2));
+            CHECK(chosen[i] == ((lanes >> i & 1) != 0 ? a[i] : b[i]));
+            CHECK(least_of[i] == std::min(a[i], b[i]));
+            CHECK(greatest_of[i] == std::max(a[i], b[i]));
+            CHECK((at_most_lanes >> i & 1) == (a[i] <= b[i]));
+            const double product = double(a[i]) * double(b[i]), exact = product + double(a[i]);
+            CHECK(std::abs(about[i] - exact) <= 0x1.01p-24 * (std::abs(product) + std::abs(exact)));
+        }
+    }
+}
+
 TEST_CASE("comparisons with NaN are false; of NaN and a number, min and max return the second") {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     CHECK(at_most(broadcast(nan), broadcast(1.0f)) == 0);
