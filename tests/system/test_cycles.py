@@ -155,7 +155,7 @@ class Comparison(Folder):
     def test_cornell(self):
         """Two bounces, so that one more or less of either renderer would be far off."""
         path = self.folder / "cycles.json"
-        done = compare("--scene", "scenes/cornell/scene.json", "--size", "32x32", "--spp", 4, "--reference-spp", 256, "--bounces", 2,
+        done = compare("--scene", "scenes/cornell/scene.json", "--size", "32x32", "--spp", 64, "--reference-spp", 256, "--bounces", 2,
                        "--runs", 1, "--json", path)
         self.assertEqual(done.returncode, 0, done.stderr)
         file = json.loads(path.read_text())
@@ -164,7 +164,7 @@ class Comparison(Folder):
         self.assertEqual([row["renderer"] for row in file["rows"]], ["pathscope", "cycles"])
         for row in file["rows"]:
             self.assertEqual(set(row), ROW_KEYS)
-            self.assertEqual((row["scene"], row["width"], row["height"], row["spp"], row["bounces"]), ("cornell", 32, 32, 4, 2))
+            self.assertEqual((row["scene"], row["width"], row["height"], row["spp"], row["bounces"]), ("cornell", 32, 32, 64, 2))
             self.assertTrue(row["samples_per_cpu_s"] > 0 and 0 < row["cpu_s"] and 0 < row["rel_mse"] <= row["rel_mse_all"], row)
         self.assertLessEqual(RATIOS, set(file["ratios"][0]))
         self.check_means(file["agreement"][0])
@@ -176,7 +176,7 @@ class Comparison(Folder):
                    camera={"position": [2, 1.5, 2.5], "look_at": [0.5, 0.5, 0.5]})
         (self.folder / "box.obj").write_text(BOX)
         path = self.folder / "cycles.json"
-        done = compare("--scene", self.folder / "scene.json", "--size", "32x32", "--spp", 4, "--reference-spp", 64, "--bounces", 1,
+        done = compare("--scene", self.folder / "scene.json", "--size", "32x32", "--spp", 64, "--reference-spp", 256, "--bounces", 1,
                        "--runs", 1, "--json", path)
         self.assertEqual(done.returncode, 0, done.stderr)
         for ratio in json.loads(path.read_text())["agreement"][0]["mean_ratio"]:
