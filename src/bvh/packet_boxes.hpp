@@ -7,8 +7,8 @@
 ///
 /// and none leaves it after the corresponding t_far. Rounding is monotonic, so this holds for the numbers that BoxRay
 /// would compute for each ray. Where intervals tell little, because the rays begin at different points or their directions
-/// differ in sign, each box that is left is tested with each ray too, up to the hit that the ray has already. So no ray
-/// misses a leaf that it would open on its own.
+/// differ in sign or by much, each box that is left is tested with each ray too, up to the hit that the ray has already.
+/// So no ray misses a leaf that it would open on its own.
 ///
 /// Source: Boulos, Wald & Shirley 2006, "Geometric and Arithmetic Culling Methods for Entire Ray Packets".
 

@@ -44,6 +44,7 @@ struct PacketRays {
     }
 };
 
+[[nodiscard]] inline Float8 magnitude(Float8 a) { return max(a, broadcast(0.0f) - a); }
 [[nodiscard]] inline Float16 magnitude(Float16 a) { return max(a, broadcast16(0.0f) - a); }
 
 /// Lowest and highest of each number over all rays.

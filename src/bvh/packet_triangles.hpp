@@ -66,7 +66,7 @@ struct BlockEdges {
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 const Float8 x = load(block.corners[i][axis].data()) - broadcast(lines.centre[axis]);
                 corner[i][axis] = x;
-                size = max(max(x, broadcast(0.0f) - x), size);
+                size = max(magnitude(x), size);
             }
         for (std::size_t i = 0; i < 3; ++i) {
             const auto &p = corner[i], &q = corner[(i + 1) % 3];
@@ -113,10 +113,7 @@ struct PacketTriangleRays {
     explicit PacketTriangleRays(const PacketRays& packet) : rays(packet) {
         for (std::size_t i = 0; i < rays.groups * k_group; i += k_wide) {
             const auto row = [&](const PacketRays::Row& numbers) { return load(numbers.data() + i); };
-            const auto size = [&](std::size_t axis) {
-                const Float8 d = row(rays.direction[axis]);
-                return max(d, broadcast(0.0f) - d);
-            };
+            const auto size = [&](std::size_t axis) { return magnitude(row(rays.direction[axis])); };
             const Float8 x = size(0), y = size(1), z = size(2);
             longest_x[i / k_wide] = at_most(y, x) & at_most(z, x);
             longest_y[i / k_wide] = ~longest_x[i / k_wide] & at_most(z, y) & k_all_wide;
