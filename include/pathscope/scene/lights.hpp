@@ -29,6 +29,7 @@
 #include <variant>
 #include <vector>
 
+#include "pathscope/core/check.hpp"
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/geometry/mesh.hpp"
 #include "pathscope/math/vec.hpp"
@@ -148,9 +149,10 @@ inline constexpr std::uint32_t k_least_tree_lights = 4;
 void finish_light_table(LightTable& table, float scene_radius,
                         std::span<const std::optional<LightBounds>> bounds);
 
-/// P(light) by area or power, which do not ask where the point is. Requires: light < lights.size().
+/// P(light) where the point does not matter. Requires: by area or power; light < lights.size().
 [[nodiscard]] inline float pick_probability(const LightTable& table, LightSampling sampling,
                                             std::uint32_t light) {
+    CHECK(sampling != LightSampling::tree);
     return table.pick[std::size_t(sampling)].pmf(int(light));
 }
 
