@@ -1,0 +1,210 @@
+#pragma once
+/// The client of a frame as a state machine: admits servers, keeps them up to date, hands out rounds, merges what comes
+/// back, and renders direct light itself meanwhile. docs/protocol.md, section 6.2.
+///
+///     something happened, at a time  ->  on_...(what, now)  ->  calls of the ClientWorld: messages, rounds of its own
+///
+/// Why no socket, no clock, no thread: the same machine runs against real sockets (client_session.hpp) and against a network
+/// that delays, doubles, drops and cuts in virtual time (tests/session/simulated_cluster.hpp), thousands of times a minute.
+/// With no server alive, and none on its way, indirect rounds go to the client's own renderer, so the image is finished
+/// whatever dies. Every step of every server is in the event store, with its reason.
+/// Requires: `now` never falls.
+/// Thread safety: one thread at a time.   Test: tests/session/test_simulation.cpp, test_cluster.cpp
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pathscope/cluster/clock_offset.hpp"
+#include "pathscope/cluster/lease_policy.hpp"
+#include "pathscope/cluster/peer.hpp"
+#include "pathscope/probe/event_store.hpp"
+#include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/client_config.hpp"
+#include "pathscope/session/frame_work.hpp"
+#include "pathscope/session/render_state.hpp"
+#include "pathscope/session/round_runner.hpp"
+#include "pathscope/session/scene_depot.hpp"
+
+namespace pathscope {
+
+/// What to render.
+struct ClientJob {
+    RenderState state;
+    std::shared_ptr<const Scene> scene;  ///< Of state.scene, files and options.
+    SceneDepot depot;                    ///< Of the same files.
+};
+
+/// What people watch.
+struct Progress {
+    double direct = 0, indirect = 0;  ///< 0 to 1
+    int servers_ready = 0;
+    int servers_known = 0;  ///< Ready, or on their way to be.
+    bool waiting = false;   ///< Indirect light waits for servers.
+    bool alone = false;     ///< The client renders indirect light itself.
+};
+
+/// What the machine does to the world.
+class ClientWorld {
+  public:
+    virtual ~ClientWorld() = default;
+
+    /// To one server. False if it is not connected or does not keep up; then the message is gone.
+    virtual bool send(Channel channel, const std::string& instance, Frames frames) = 0;
+
+    /// To all servers, on the input channel; may be lost on its way to any of them.
+    virtual void publish(Frames frames) = 0;
+
+    /// Begins a round of the client's own renderer. Each has one outcome: on_outcome().
+    virtual void begin(RoundJob job) = 0;
+    virtual void cancel_all() = 0;
+};
+
+class ClientMachine {
+  public:
+    /// session: random, not 0; tells this run from an earlier one. `store` and `world` outlive the machine.
+    ClientMachine(const ClientConfig& config, ClientJob job, std::uint64_t session, EventStore& store,
+                  ClientWorld& world, TimeNs now);
+
+    // -- What happens ---------------------------------------------------------------------------------------
+
+    /// A local server was started; the frame waits for it a while.
+    void expect_server(std::uint32_t pid, std::string name);
+    void on_process_ended(std::uint32_t pid, std::string_view name, std::string_view how, TimeNs now);
+    void on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now);
+    void on_outcome(RoundOutcome& outcome, TimeNs now);
+
+    /// This process itself did not run for so long: that silence proves nothing about servers.
+    void on_own_pause(TimeNs pause);
+
+    /// Does what is due: heartbeats, judging silence, expired leases, handing out. To be called after everything else that
+    /// happened, and at next_timer().
+    void on_timers(TimeNs now);
+    [[nodiscard]] TimeNs next_timer(TimeNs now) const;
+
+    /// A new camera, size, lever or scene: the epoch rises, servers are told, the frame begins anew. The scene must be
+    /// given too when the state is of another one.
+    void change_state(RenderState state, std::shared_ptr<const Scene> scene, TimeNs now);
+
+    /// The end of the session: local servers shall end, others shall look for the next client.
+    void say_goodbye(TimeNs now);
+
+    // -- View -----------------------------------------------------------------------------------------------
+
+    /// Nothing is left to wait for: the image is finished, or the time limit was reached and every block has samples.
+    [[nodiscard]] bool complete() const { return work_.complete(); }
+    [[nodiscard]] Progress progress() const;
+    [[nodiscard]] const FrameWork& work() const { return work_; }
+    [[nodiscard]] const RenderState& state() const { return job_.state; }
+    [[nodiscard]] Epoch epoch() const { return work_.epoch(); }
+    [[nodiscard]] std::uint64_t saturated() const { return saturated_; }
+    [[nodiscard]] const std::vector<DroppedSample>& dropped() const { return dropped_; }
+
+  private:
+    struct Server {
+        std::string instance;
+        std::string name;
+        std::uint32_t pid = 0;
+        Peer peer;
+        FailureDetector detector;
+        ClockEstimate clock{};
+        Credits credits{0};
+        SpeedEstimate speed{};
+        TimeNs next_ping = 0;
+    };
+    /// A round of the client's own renderer: one part of it, or both.
+    struct LocalWork {
+        std::optional<Lease> direct, indirect;
+    };
+    /// A process that this client started.
+    struct LocalServer {
+        std::uint32_t pid;
+        std::string name;
+        bool joined = false;
+        bool ended = false;
+
+        /// Process ids repeat from machine to machine: the name must be ours as well.
+        [[nodiscard]] bool is(std::uint32_t other_pid, std::string_view other_name) const {
+            return pid == other_pid && name == other_name;
+        }
+    };
+
+    // client_machine.cpp: messages.
+    void count_dropped(ServerId server, std::string_view sentence, Channel channel);
+    void reject_undecodable(const std::string& instance, const DecodeError& error, Channel channel);
+    void ask_who(const std::string& instance);
+    void send(Channel channel, const std::string& instance, Message message, ServerId peer = k_local_server);
+    void record(EventBody body);
+    void enforce_time_limit();
+    template <class Other>
+    void on(Server&, Other&) {}  // HELLO is handled before; the rest never decodes for a client.
+
+    // client_joining.cpp: from HELLO to READY, and the way out.
+    [[nodiscard]] std::optional<std::string> reason_to_reject(const std::string& instance,
+                                                              const message::Hello& hello) const;
+    void on_hello(const std::string& instance, const message::Hello& hello);
+    void on(Server& server, message::SnapshotRequest& message);
+    void on(Server& server, message::ManifestRequest& message);
+    void on(Server& server, message::PieceRequest& message);
+    void on(Server& server, message::Ready& message);
+    void on(Server& server, message::Credit& message);
+    void on(Server& server, message::Bye& message);
+    [[nodiscard]] message::Welcome welcome(ServerId id) const;
+    void step_peer(Server& server, PeerCause cause, std::string_view detail);
+    void lose(const std::string& instance, PeerCause cause, std::string_view why);
+
+    // client_heartbeats.cpp: who lives.
+    void on(Server& server, message::Ping& message);
+    void on(Server& server, message::Pong& message);
+    void watch_heartbeats();
+
+    // client_work.cpp: leases out, light in.
+    void on(Server& server, message::Tile& message);
+    void on(Server& server, message::Nack& message);
+    [[nodiscard]] int alive_servers() const;
+    [[nodiscard]] bool expects_servers() const;
+    [[nodiscard]] bool renders_alone() const { return alive_servers() == 0 && !expects_servers(); }
+    void servers_changed();
+    void hand_out();
+    void hand_out_to(Server& server);
+    bool grant_to(Server& server);
+    void send_lease(Server& server, const Lease& lease);
+    [[nodiscard]] std::optional<LocalWork> next_local_work();
+    void hand_out_locally();
+    void settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result);
+    void count_result(const RoundResult& result, ServerId server);
+    void cancel_superseded(const std::vector<Lease>& leases);
+
+    ClientConfig config_;
+    ClientJob job_;
+    EventStore& store_;
+    ClientWorld& world_;
+    TimeNs now_;  ///< Of what is happening.
+    TimeNs started_;
+    TimeNs heartbeat_;
+
+    std::uint64_t session_;
+    std::uint64_t sequence_ = 0;  ///< Of the last INPUT.
+    std::string packed_state_;
+    Digest state_hash_{};
+
+    std::map<std::string, Server> servers_;  ///< By instance; those that live.
+    std::vector<LocalServer> local_servers_;
+    std::uint32_t last_server_ = 0;
+    bool reached_min_servers_ = false;
+    bool announced_alone_ = false;
+    std::map<std::string, TimeNs> who_asked_;  ///< Unknown peers, bounded.
+
+    FrameWork work_;
+    std::uint64_t last_ticket_ = 0;
+    std::map<std::uint64_t, LocalWork> local_work_;  ///< In the client's renderer, by ticket.
+    std::uint64_t saturated_ = 0;
+    std::vector<DroppedSample> dropped_;  ///< The first k_max_dropped_listed.
+    bool stopped_ = false;
+};
+
+}  // namespace pathscope

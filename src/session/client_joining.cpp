@@ -1,0 +1,142 @@
+#include "pathscope/session/client_machine.hpp"
+
+#include <fmt/format.h>
+
+#include "pathscope/core/log.hpp"
+#include "pathscope/session/build_identity.hpp"
+
+namespace pathscope {
+namespace {
+
+constexpr std::size_t k_max_servers = 4096;
+constexpr std::uint32_t k_server_credits = 2;  ///< One round in work, one waiting: no pause between them.
+
+/// When a server may believe that its client is gone: late, since nothing is lost by waiting.
+TimeNs dead_after_of(DetectorKind kind) {
+    return kind == DetectorKind::fixed ? 20 * k_second_ns : 5 * k_second_ns;
+}
+
+}  // namespace
+
+std::optional<std::string> ClientMachine::reason_to_reject(const std::string& instance,
+                                                           const message::Hello& hello) const {
+    if (hello.instance != instance) return "HELLO names another instance than its connection has.";
+    if (hello.build != build_identity())
+        return fmt::format(
+            "The client is '{}', this server is '{}': their pixels could differ in the last bit. Run "
+            "the same build on both machines.",
+            build_identity(), hello.build);
+    return std::nullopt;
+}
+
+void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello) {
+    if (const auto reason = reason_to_reject(instance, hello)) {
+        log_warning(fmt::format("Refused the server {}: {}", hello.name, *reason));
+        return send(Channel::monitor, instance,
+                    message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed,
+                                    *reason, 0});
+    }
+    auto found = servers_.find(instance);
+    if (found != servers_.end()) {
+        // It did not hear the WELCOME, or forgot its work: it starts over under the same id.
+        Server& server = found->second;
+        work_.indirect_ledger().revoke(server.peer.id(), now_);
+        server.credits.clear();
+        step_peer(server, PeerCause::state_lost, "It said HELLO again.");
+    } else {
+        if (servers_.size() >= k_max_servers)
+            return send(
+                Channel::monitor, instance,
+                message::Reject{RejectCode::full, "The client has as many servers as it can take.", 5000});
+        const ServerId id{++last_server_};
+        found = servers_
+                    .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
+                                              FailureDetector(config_.detector, now_)})
+                    .first;
+        found->second.next_ping = now_;
+        store_.name_server(id, hello.name);
+        store_.count(Counter::servers_joined, 1, id);
+        for (LocalServer& local : local_servers_)
+            if (local.is(hello.pid, hello.name)) local.joined = true;
+        step_peer(found->second, PeerCause::welcomed, fmt::format("{} said HELLO.", hello.name));
+    }
+    send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());
+    servers_changed();
+}
+
+message::Welcome ClientMachine::welcome(ServerId id) const {
+    message::Welcome welcome;
+    welcome.session = session_;
+    welcome.server = id;
+    welcome.heartbeat_ms = std::uint32_t(heartbeat_ / k_millisecond_ns);
+    welcome.dead_after_ms = std::uint32_t(dead_after_of(config_.detector) / k_millisecond_ns);
+    welcome.credits = k_server_credits;
+    welcome.epoch = work_.epoch();
+    welcome.sequence = sequence_;
+    welcome.state_hash = state_hash_;
+    welcome.state = packed_state_;
+    return welcome;
+}
+
+void ClientMachine::on(Server& server, message::SnapshotRequest&) {
+    send(Channel::monitor, server.instance,
+         message::Snapshot{session_, work_.epoch(), sequence_, state_hash_, packed_state_}, server.peer.id());
+}
+
+void ClientMachine::on(Server& server, message::ManifestRequest& message) {
+    if (auto answer = job_.depot.answer(message))
+        send(Channel::monitor, server.instance, std::move(*answer), server.peer.id());
+}
+
+void ClientMachine::on(Server& server, message::PieceRequest& message) {
+    if (auto answer = job_.depot.answer(message))
+        send(Channel::monitor, server.instance, std::move(*answer), server.peer.id());
+    else
+        count_dropped(server.peer.id(), "PIECE_REQUEST: the scene has no such file.", Channel::monitor);
+}
+
+void ClientMachine::on(Server& server, message::Ready& message) {
+    if (message.session != session_ || message.epoch != work_.epoch() || message.state_hash != state_hash_)
+        return;
+    if (server.peer.state() == PeerState::syncing)
+        step_peer(server, PeerCause::synced, "It holds state and scene.");
+    servers_changed();
+}
+
+void ClientMachine::on(Server& server, message::Credit& message) {
+    if (message.session == session_) server.credits.set_limit(std::min(message.credits, k_server_credits));
+}
+
+void ClientMachine::on(Server& server, message::Bye& message) {
+    if (message.reason == ByeReason::draining) {
+        step_peer(server, PeerCause::drain, message.text);
+        return servers_changed();
+    }
+    lose(server.instance, message.reason == ByeReason::leaving ? PeerCause::left : PeerCause::lost,
+         message.text);
+}
+
+void ClientMachine::step_peer(Server& server, PeerCause cause, std::string_view detail) {
+    const PeerState before = server.peer.state();
+    if (!server.peer.apply(cause, now_)) return;
+    if (store_.keeps_events())
+        record(StateEvent{"peer", server.peer.id(), name_of(before), name_of(server.peer.state()), detail});
+}
+
+/// A server is gone; what it owed is open again. Its entry, and so `instance` if it is the entry's, ends here.
+void ClientMachine::lose(const std::string& instance, PeerCause cause, std::string_view why) {
+    const auto found = servers_.find(instance);
+    if (found == servers_.end()) return;
+    Server& server = found->second;
+    const ServerId id = server.peer.id();
+    step_peer(server, cause, why);
+    const std::size_t open = work_.indirect_ledger().revoke(id, now_).size();
+    if (cause == PeerCause::lost) store_.count(Counter::died, 1, id);
+    log_note(fmt::format("{} {}: {} {} round{} of it go{} to others.", server.name,
+                         cause == PeerCause::lost ? "is lost" : "left", why, open, open == 1 ? "" : "s",
+                         open == 1 ? "es" : ""));
+    servers_.erase(found);
+    servers_changed();
+}
+
+}  // namespace pathscope

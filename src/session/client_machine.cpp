@@ -1,0 +1,213 @@
+#include "pathscope/session/client_machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "pathscope/core/log.hpp"
+
+namespace pathscope {
+namespace {
+
+constexpr TimeNs k_who_pause = k_second_ns;
+constexpr std::size_t k_max_unknown_peers = 256;
+
+std::uint64_t size_of(const Frames& frames) {
+    return std::accumulate(frames.begin(), frames.end(), std::uint64_t{0},
+                           [](std::uint64_t sum, const std::string& frame) { return sum + frame.size(); });
+}
+
+/// The classic detector looks every six seconds; the adaptive one needs beats.
+TimeNs heartbeat_of(DetectorKind kind) {
+    return kind == DetectorKind::fixed ? FixedDetectorParams{}.period
+                                       : AdaptiveDetectorParams{}.expected_interval;
+}
+
+}  // namespace
+
+ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uint64_t session,
+                             EventStore& store, ClientWorld& world, TimeNs now)
+    : config_(config),
+      job_(std::move(job)),
+      store_(store),
+      world_(world),
+      now_(now),
+      started_(now),
+      heartbeat_(heartbeat_of(config.detector)),
+      session_(session),
+      work_({config.block_size, config.round_samples, config.schedule, config.order, config.sampling},
+            store) {
+    store_.name_server(k_local_server, "client");
+    job_.state.files = job_.depot.manifest_hash();
+    packed_state_ = pack(encode_state(job_.state));
+    state_hash_ = hash_text(packed_state_);
+    work_.begin(job_.state.settings, Epoch{1}, now_);
+    servers_changed();
+}
+
+// ---- Time.
+
+void ClientMachine::on_timers(TimeNs now) {
+    now_ = now;
+    watch_heartbeats();
+    work_.indirect_ledger().expire(now_);
+    enforce_time_limit();
+    hand_out();
+}
+
+TimeNs ClientMachine::next_timer(TimeNs now) const {
+    TimeNs next = now + k_second_ns;
+    for (const auto& [instance, server] : servers_) next = std::min(next, server.next_ping);
+    if (!servers_.empty()) next = std::min(next, now + heartbeat_ / 4);
+    if (const auto deadline = work_.indirect_ledger().next_deadline()) next = std::min(next, *deadline);
+    if (config_.time_limit > 0 && !stopped_) next = std::min(next, started_ + config_.time_limit);
+    return std::max(next, now);
+}
+
+void ClientMachine::enforce_time_limit() {
+    if (config_.time_limit == 0 || stopped_ || now_ - started_ < config_.time_limit || !work_.has_image())
+        return;
+    stopped_ = true;
+    work_.stop();
+    world_.cancel_all();
+}
+
+void ClientMachine::on_own_pause(TimeNs pause) {
+    for (auto& [instance, server] : servers_) server.detector.excuse(pause);
+}
+
+// ---- The state.
+
+void ClientMachine::change_state(RenderState state, std::shared_ptr<const Scene> scene, TimeNs now) {
+    now_ = now;
+    state.files = job_.depot.manifest_hash();
+    CHECK(scene || same_scene(state, job_.state));
+    const PackMap changes = state_changes(job_.state, state);
+    job_.state = std::move(state);
+    if (scene) job_.scene = std::move(scene);
+    packed_state_ = pack(encode_state(job_.state));
+    state_hash_ = hash_text(packed_state_);
+
+    const Epoch epoch{work_.epoch().value + 1};
+    world_.cancel_all();
+    work_.begin(job_.state.settings, epoch, now_);
+    servers_changed();
+    Frames input = encode(message::Input{session_, epoch, ++sequence_, state_hash_, pack(changes)});
+    store_.count_all({{Counter::messages_out, 1}, {Counter::bytes_out, size_of(input)}});
+    world_.publish(std::move(input));
+    for (auto& [instance, server] : servers_)
+        if (server.credits.owed() > 0)
+            send(Channel::frames, instance, message::Cancel{session_, epoch, {}}, server.peer.id());
+}
+
+// ---- Messages.
+
+void ClientMachine::on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now) {
+    now_ = now;
+    const auto found = servers_.find(instance);
+    Server* server = found == servers_.end() ? nullptr : &found->second;
+    const ServerId id = server ? server->peer.id() : k_local_server;
+    const std::uint64_t bytes = size_of(frames);
+    store_.count_all({{Counter::messages_in, 1}, {Counter::bytes_in, bytes}}, id);
+
+    Decoded decoded = decode(std::move(frames), Role::client, channel);
+    if (!decoded) {
+        count_dropped(id, decoded.error().sentence, channel);
+        return reject_undecodable(instance, decoded.error(), channel);
+    }
+    if (store_.keeps_events())
+        record(MessageEvent{MessageWay::received, name_of(type_of(*decoded)), name_of(channel), id, bytes,
+                            LongText(to_text(*decoded))});
+    if (const auto* hello = std::get_if<message::Hello>(&*decoded)) return on_hello(instance, *hello);
+    if (!server) {
+        count_dropped(id, "It comes from a server that did not say HELLO.", channel);
+        return ask_who(instance);
+    }
+    if (type_of(*decoded) != MessageType::pong) server->detector.on_traffic(now_);
+    if (server->peer.state() == PeerState::suspect) step_peer(*server, PeerCause::heard, "It spoke again.");
+    std::visit([&](auto& message) { on(*server, message); }, *decoded);
+}
+
+void ClientMachine::record(EventBody body) { store_.record({now_, 0, k_local_server, 0, std::move(body)}); }
+
+void ClientMachine::count_dropped(ServerId server, std::string_view sentence, Channel channel) {
+    store_.count(Counter::bad_messages, 1, server);
+    if (store_.keeps_events())
+        record(MessageEvent{MessageWay::dropped, "", name_of(channel), server, 0, sentence});
+}
+
+void ClientMachine::reject_undecodable(const std::string& instance, const DecodeError& error,
+                                       Channel channel) {
+    if (channel != Channel::monitor) return;
+    if (error.fault == DecodeFault::version)
+        send(channel, instance,
+             message::Reject{
+                 RejectCode::version,
+                 fmt::format("The client speaks protocol version {}, this server {}. Install the same "
+                             "version on both machines.",
+                             k_protocol_version, error.version),
+                 0});
+    else if (error.fault == DecodeFault::malformed && error.type == std::uint8_t(MessageType::hello))
+        send(channel, instance, message::Reject{RejectCode::malformed, error.sentence, 0});
+}
+
+/// An unknown peer may be a server that was given up too early: it shall begin anew. At most once a second each.
+void ClientMachine::ask_who(const std::string& instance) {
+    std::erase_if(who_asked_, [this](const auto& asked) { return now_ - asked.second >= k_who_pause; });
+    if (who_asked_.size() >= k_max_unknown_peers || who_asked_.contains(instance)) return;
+    who_asked_.emplace(instance, now_);
+    send(Channel::monitor, instance, message::Who{});
+}
+
+void ClientMachine::send(Channel channel, const std::string& instance, Message message, ServerId peer) {
+    const bool keeps_events = store_.keeps_events();
+    const std::string text = keeps_events ? to_text(message) : std::string();
+    const MessageType type = type_of(message);
+    Frames frames = encode(std::move(message));
+    const std::uint64_t bytes = size_of(frames);
+    const bool left = world_.send(channel, instance, std::move(frames));
+    if (left) store_.count_all({{Counter::messages_out, 1}, {Counter::bytes_out, bytes}}, peer);
+    if (keeps_events)
+        record(MessageEvent{left ? MessageWay::sent : MessageWay::dropped, name_of(type), name_of(channel),
+                            peer, bytes,
+                            LongText(left ? text : "The peer is not connected, or does not keep up.")});
+}
+
+// ---- Local servers, and the end.
+
+void ClientMachine::expect_server(std::uint32_t pid, std::string name) {
+    local_servers_.push_back({pid, std::move(name)});
+}
+
+void ClientMachine::on_process_ended(std::uint32_t pid, std::string_view name, std::string_view how,
+                                     TimeNs now) {
+    now_ = now;
+    const auto local = std::find_if(local_servers_.begin(), local_servers_.end(),
+                                    [&](const LocalServer& one) { return one.is(pid, name); });
+    CHECK(local != local_servers_.end(), pid, name);
+    local->ended = true;
+    const auto server = std::find_if(servers_.begin(), servers_.end(), [&](const auto& entry) {
+        return local->is(entry.second.pid, entry.second.name);
+    });
+    const std::string why = fmt::format("Its process ended with {}.", how);
+    if (server != servers_.end()) {
+        lose(server->first, PeerCause::lost, why);
+    } else if (!local->joined) {
+        log_warning(fmt::format("The local server {} did not join: {}", local->name, why));
+        servers_changed();
+    }
+}
+
+void ClientMachine::say_goodbye(TimeNs now) {
+    now_ = now;
+    for (const auto& [instance, server] : servers_) {
+        const bool is_ours =
+            std::any_of(local_servers_.begin(), local_servers_.end(),
+                        [&](const LocalServer& local) { return local.is(server.pid, server.name); });
+        send(Channel::monitor, instance,
+             message::Bye{is_ours ? ByeReason::stop : ByeReason::leaving, "The frame is finished."});
+    }
+}
+
+}  // namespace pathscope

@@ -1,0 +1,238 @@
+#include "pathscope/session/client_machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pathscope/core/log.hpp"
+#include "pathscope/protocol/block_result.hpp"
+
+namespace pathscope {
+namespace {
+
+constexpr std::size_t k_local_rounds = 2;  ///< One in work, one waiting: no pause between them.
+constexpr TimeNs k_join_patience =
+    20 * k_second_ns;  ///< A local server that has not joined by then is not waited for.
+
+}  // namespace
+
+int ClientMachine::alive_servers() const {
+    return int(std::count_if(servers_.begin(), servers_.end(), [](const auto& entry) {
+        return entry.second.peer.alive() && entry.second.peer.state() != PeerState::draining;
+    }));
+}
+
+bool ClientMachine::expects_servers() const {
+    if (!reached_min_servers_ && config_.min_servers > 0) {
+        const bool can_come = config_.listens || now_ - started_ < k_join_patience;
+        if (can_come) return true;
+    }
+    return now_ - started_ < k_join_patience &&
+           std::any_of(local_servers_.begin(), local_servers_.end(),
+                       [](const LocalServer& local) { return !local.joined && !local.ended; });
+}
+
+/// Tells the schedule who may be given work.
+void ClientMachine::servers_changed() {
+    std::vector<ServerShare> shares;
+    int ready = 0;
+    for (const auto& [instance, server] : servers_) {
+        const PeerState state = server.peer.state();
+        ready += state == PeerState::ready || state == PeerState::suspect;
+        if (state == PeerState::ready || state == PeerState::suspect)
+            shares.push_back({server.peer.id(), server.speed.per_second()});
+    }
+    reached_min_servers_ = reached_min_servers_ || ready >= std::max(1, config_.min_servers);
+    if (renders_alone()) shares.push_back({k_local_server, 0});
+    std::sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+    work_.set_servers(std::move(shares));
+}
+
+void ClientMachine::hand_out() {
+    if (stopped_) return;
+    const bool alone = renders_alone();
+    if (alone != announced_alone_) {
+        announced_alone_ = alone;
+        servers_changed();
+        if (alone && last_server_ > 0 && !work_.complete())
+            log_note("No server is left; the client carries on alone.");
+    }
+    if (config_.min_servers == 0 || reached_min_servers_)
+        for (auto& [instance, server] : servers_) hand_out_to(server);
+    hand_out_locally();
+}
+
+void ClientMachine::hand_out_to(Server& server) {
+    while (server.peer.accepts_work() && server.credits.available() && grant_to(server)) {
+    }
+}
+
+bool ClientMachine::grant_to(Server& server) {
+    const ServerId id = server.peer.id();
+    // What it owes comes first, so that counts into the time this round may take.
+    const auto duration = [&](const Round& round, std::uint32_t attempts) {
+        const double samples = double(round.samples()) * double(server.credits.owed() + 1);
+        return lease_duration(server.speed.predict(samples), attempts);
+    };
+    std::optional<Lease> lease = work_.grant_indirect(id, now_, duration);
+    if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
+        // Nothing is open, but another server may be late with its last rounds.
+        const double samples = double(config_.block_size) * config_.block_size * config_.round_samples;
+        if (const auto estimate = server.speed.predict(samples))
+            if (const auto straggler = pick_straggler(work_.indirect_ledger(), id, now_, *estimate))
+                lease = work_.indirect_ledger().grant_copy(id, *straggler, now_, lease_duration(estimate, 1));
+    }
+    if (!lease) return false;
+    send_lease(server, *lease);
+    return true;
+}
+
+void ClientMachine::send_lease(Server& server, const Lease& lease) {
+    const TimeNs duration = lease.deadline - now_;
+    server.credits.take(lease.id, lease.deadline + duration);
+    message::Lease message;
+    message.session = session_;
+    message.lease = lease.id;
+    message.epoch = lease.epoch;
+    message.strategy = std::string(k_blocks_strategy);
+    message.unit = lease.unit;
+    message.rect = work_.round_of(lease).rect;
+    message.first = lease.first;
+    message.count = lease.count;
+    message.lease_ms = std::uint32_t(std::clamp<TimeNs>(duration / k_millisecond_ns, 1, 3'600'000));
+    send(Channel::frames, server.instance, std::move(message), server.peer.id());
+}
+
+/// The client's next own round. Alone it renders both parts, which then grow evenly: of one round together wherever it
+/// can; else direct light is all there is to do.
+std::optional<ClientMachine::LocalWork> ClientMachine::next_local_work() {
+    LocalWork work;
+    const auto take_indirect = [&] {
+        if (!announced_alone_) return;
+        work.indirect = work_.grant_indirect(k_local_server, now_, [](const Round&, std::uint32_t) {
+            return TimeNs{1} << 61;  // No deadline: if the client is gone, so is the account.
+        });
+    };
+    if (work_.indirect_progress() > work_.direct_progress()) work.direct = work_.grant_direct(now_);
+    if (!work.direct) take_indirect();
+    if (work.indirect)
+        work.direct = work_.grant_direct_beside(*work.indirect, now_);
+    else if (!work.direct)
+        work.direct = work_.grant_direct(now_);
+    if (!work.direct && !work.indirect) return std::nullopt;
+    return work;
+}
+
+void ClientMachine::hand_out_locally() {
+    while (local_work_.size() < k_local_rounds) {
+        const std::optional<LocalWork> work = next_local_work();
+        if (!work) return;
+        const std::uint64_t ticket = ++last_ticket_;
+        const LightPart part = work->indirect ? LightPart::indirect : LightPart::direct;
+        const bool direct_too = work->indirect && work->direct;
+        const Round round = work_.round_of(work->indirect ? *work->indirect : *work->direct);
+        local_work_.emplace(ticket, *work);
+        world_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too});
+    }
+}
+
+void ClientMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
+    now_ = now;
+    const LocalWork work = local_work_.extract(outcome.ticket).mapped();
+    if (work.direct) settle(LightPart::direct, *work.direct, work.indirect ? outcome.direct : outcome.result);
+    if (work.indirect) settle(LightPart::indirect, *work.indirect, outcome.result);
+}
+
+/// Books what the client's own renderer made of a lease.
+void ClientMachine::settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result) {
+    if (!result) {  // Cancelled: its epoch ended, or the time limit was reached.
+        if (part == LightPart::direct)
+            work_.release_direct(lease, now_);
+        else
+            work_.indirect_ledger().release(lease.id, k_local_server, now_);
+        return;
+    }
+    const ResultClaim claim{lease.id, lease.epoch, lease.unit, lease.first, lease.count, k_local_server};
+    const Commit commit = work_.commit(part, claim, result->sums, now_);
+    if (commit.verdict == Verdict::accepted) count_result(*result, k_local_server);
+    cancel_superseded(commit.superseded);
+}
+
+void ClientMachine::on(Server& server, message::Tile& tile) {
+    const ServerId id = server.peer.id();
+    server.credits.settle(tile.lease);
+    const ResultClaim claim{
+        tile.lease, tile.session == session_ ? tile.epoch : Epoch{}, tile.unit, tile.first, tile.count, id};
+    // Decoded only if it counts, committed only if it decodes.
+    if (work_.indirect_ledger().judge(claim) != Verdict::accepted) {
+        work_.commit(LightPart::indirect, claim, {}, now_);
+        return;
+    }
+    const std::int64_t pixels = work_.rect_of(tile.unit).area();
+    RoundResult result;
+    result.rays = tile.rays;
+    result.samples = std::uint64_t(pixels) * tile.count;
+    result.dropped = tile.dropped;
+    result.dropped_count = tile.dropped_count;
+    result.saturated_count = tile.saturated_count;
+    const TimeNs started = tile.started_ns, render_time = tile.render_ns;
+    const LeaseId lease = tile.lease;
+    Result<std::vector<PixelSum>> sums = block_result(std::move(tile), pixels);
+    if (!sums) {
+        work_.indirect_ledger().release(lease, id, now_);
+        return count_dropped(id, sums.error().message, Channel::frames);
+    }
+
+    const Commit commit = work_.commit(LightPart::indirect, claim, *sums, now_);
+    server.speed.add(double(result.samples), render_time);
+    store_.add_latency(Latency::tile, commit.since_grant, id);
+    count_result(result, id);
+    if (const auto offset = server.clock.at(now_); offset && store_.keeps_events())
+        store_.record({offset->to_client(started), 0, id, 0, SpanEvent{"render", render_time, lease}});
+    cancel_superseded(commit.superseded);
+}
+
+void ClientMachine::on(Server& server, message::Nack& message) {
+    server.credits.settle(message.lease);
+    if (message.session != session_ || message.epoch != work_.epoch()) return;
+    work_.indirect_ledger().release(message.lease, server.peer.id(), now_);
+    if (message.code == NackCode::state || message.code == NackCode::scene) {
+        step_peer(server, PeerCause::state_lost, name_of(message.code));
+        return servers_changed();
+    }
+    if (message.code == NackCode::unsupported || message.code == NackCode::failed ||
+        message.code == NackCode::memory)
+        lose(server.instance, PeerCause::lost, fmt::format("It cannot do its work ({}).", message.text));
+}
+
+void ClientMachine::count_result(const RoundResult& result, ServerId server) {
+    store_.count_all({{Counter::tiles, 1},
+                      {Counter::rays, result.rays},
+                      {Counter::samples, result.samples},
+                      {Counter::nonfinite_dropped, result.dropped_count}},
+                     server);
+    saturated_ += result.saturated_count;
+    for (const DroppedSample& dropped : result.dropped)
+        if (dropped_.size() < k_max_dropped_listed) dropped_.push_back(dropped);
+}
+
+void ClientMachine::cancel_superseded(const std::vector<Lease>& leases) {
+    for (const Lease& lease : leases)
+        for (auto& [instance, server] : servers_)
+            if (server.peer.id() == lease.server)
+                send(Channel::frames, instance, message::Cancel{session_, lease.epoch, {lease.id.value}},
+                     lease.server);
+}
+
+Progress ClientMachine::progress() const {
+    Progress progress;
+    progress.direct = work_.direct_progress();
+    progress.indirect = work_.indirect_progress();
+    progress.servers_known = alive_servers();
+    for (const auto& [instance, server] : servers_) progress.servers_ready += server.peer.accepts_work();
+    progress.alone = announced_alone_;
+    progress.waiting = config_.min_servers > 0 && !reached_min_servers_;
+    return progress;
+}
+
+}  // namespace pathscope
