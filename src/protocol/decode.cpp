@@ -138,13 +138,19 @@ Result<Message> read_message(Frames& frames, std::size_t index) {
 }  // namespace
 
 Decoded decode(Frames frames, Role receiver, Channel channel) {
-    if (frames.size() < 2 || frames[0].size() != 4 || !frames[0].starts_with("PS"))
+    constexpr std::size_t k_unsealed = 4;  // Version 1 had no seal; a peer that speaks it shall be told so.
+    const bool sealed = !frames.empty() && frames[0].size() == k_unsealed + k_seal_bytes;
+    const bool is_first_version =
+        !frames.empty() && frames[0].size() == k_unsealed && frames[0].starts_with("PS\x01");
+    if (frames.size() < 2 || !frames[0].starts_with("PS") || !(sealed || is_first_version))
         return DecodeError{DecodeFault::foreign, "This is no message of Pathscope."};
     const auto version = static_cast<std::uint8_t>(frames[0][2]);
     const auto type = static_cast<std::uint8_t>(frames[0][3]);
     const auto error = [&](DecodeFault fault, std::string sentence) {
         return DecodeError{fault, std::move(sentence), version, type};
     };
+    if (sealed && frames[0] != message_head(version, type, frames[1]))
+        return error(DecodeFault::damaged, "The message was damaged on its way: its seal does not fit.");
     if (version != k_protocol_version)
         return error(
             DecodeFault::version,

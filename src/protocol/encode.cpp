@@ -2,6 +2,7 @@
 
 #include "fields.hpp"
 #include "pathscope/core/check.hpp"
+#include "pathscope/core/hash.hpp"
 #include "pathscope/protocol/codec.hpp"
 #include "pathscope/wire/message_pack.hpp"
 #include "pathscope/wire/utf8.hpp"
@@ -67,11 +68,16 @@ class HeaderWriter {
     std::string* frame = nullptr;
 };
 
-std::string head(MessageType type) {
-    return {'P', 'S', static_cast<char>(k_protocol_version), static_cast<char>(type)};
-}
-
 }  // namespace
+
+std::string message_head(std::uint8_t version, std::uint8_t type, std::string_view header) {
+    std::string head{'P', 'S', static_cast<char>(version), static_cast<char>(type)};
+    Hasher hasher;
+    hasher.add(head);
+    hasher.add(header);
+    const Digest digest = hasher.finish();
+    return head.append(digest.begin(), digest.begin() + k_seal_bytes);
+}
 
 Frames encode(Message message) {
     const MessageInfo& info = k_message_table[message.index()];
@@ -83,7 +89,8 @@ Frames encode(Message message) {
             CHECK(rule.what.empty(), info.name, rule.field, rule.what);
         },
         message);
-    Frames frames{head(info.type), pack(PackValue(std::move(writer.map)))};
+    std::string header = pack(PackValue(std::move(writer.map)));
+    Frames frames{message_head(k_protocol_version, std::uint8_t(info.type), header), std::move(header)};
     if (writer.frame) {
         CHECK(writer.frame->size() <= info.max_payload_bytes, info.name, writer.frame->size());
         frames.push_back(std::move(*writer.frame));

@@ -29,9 +29,16 @@ std::string refusal(const Message& message, Frames frames) {
 
 PackMap header_of(const Frames& frames) { return *unpack(frames[1])->get<PackMap>(); }
 
+/// A message whose seal fits, whatever the header.
+Frames sealed(std::uint8_t type, std::string header, std::uint8_t version = k_protocol_version) {
+    return {message_head(version, type, header), std::move(header)};
+}
+
+/// The frames with another header, and the seal that fits it.
 Frames with_header(Frames frames, const PackMap& header) {
-    frames[1] = pack(header);
-    return frames;
+    Frames other = sealed(std::uint8_t(frames[0][3]), pack(header));
+    if (frames.size() == 3) other.push_back(std::move(frames[2]));
+    return other;
 }
 
 PackMap without(const PackMap& map, std::string_view key) {
@@ -162,25 +169,43 @@ TEST_CASE("what is not ours, of another version, unknown or misplaced is told ap
     CHECK(fault({""}) == DecodeFault::foreign);
     CHECK(fault({ping[0]}) == DecodeFault::foreign);
     CHECK(fault({"GET / HTTP/1.1", "Host: x"}) == DecodeFault::foreign);
-    CHECK(fault({"PT\x01\x0C", ping[1]}) == DecodeFault::foreign);
-    CHECK(fault({"PS\x01", ping[1]}) == DecodeFault::foreign);
-    CHECK(fault({"PS\x01\x0C\x0C", ping[1]}) == DecodeFault::foreign);
-    CHECK(fault({"PS\x02\x0C", ping[1]}) == DecodeFault::version);
-    CHECK(fault({std::string("PS\0\x0C", 4), ping[1]}) == DecodeFault::version);
-    CHECK(fault({"PS\x01\x7F", ping[1]}) == DecodeFault::unknown_type);
-    CHECK(fault({std::string("PS\x01\0", 4), ping[1]}) == DecodeFault::unknown_type);
+    CHECK(fault({"PT" + ping[0].substr(2), ping[1]}) == DecodeFault::foreign);
+    CHECK(fault({ping[0].substr(0, 3), ping[1]}) == DecodeFault::foreign);
+    CHECK(fault({ping[0].substr(0, 4), ping[1]}) == DecodeFault::foreign);  // Without its seal.
+    CHECK(fault({ping[0] + "x", ping[1]}) == DecodeFault::foreign);
+    CHECK(fault({"PS\x01\x0C", ping[1]}) == DecodeFault::version);  // The first version had no seal.
+    CHECK(fault(sealed(0x0C, ping[1], 3)) == DecodeFault::version);
+    CHECK(fault(sealed(0x0C, ping[1], 0)) == DecodeFault::version);
+    CHECK(fault(sealed(0x7F, ping[1])) == DecodeFault::unknown_type);
+    CHECK(fault(sealed(0, ping[1])) == DecodeFault::unknown_type);
     CHECK(fault(ping, Role::client, Channel::frames) == DecodeFault::misplaced);
     CHECK(fault(ping, Role::server, Channel::input) == DecodeFault::misplaced);
     CHECK(fault(encode(message::Who{}), Role::client) == DecodeFault::misplaced);
-    CHECK(fault({ping[0], ""}) == DecodeFault::malformed);
-    CHECK(fault({ping[0], "\x90"}) == DecodeFault::malformed);  // An array, not a map.
+    CHECK(fault(sealed(0x0C, "")) == DecodeFault::malformed);
+    CHECK(fault(sealed(0x0C, "\x90")) == DecodeFault::malformed);  // An array, not a map.
     CHECK(fault({ping[0], ping[1], ""}) == DecodeFault::malformed);
-    CHECK(fault({ping[0], std::string((64 << 10) + 1, '\xC0')}) == DecodeFault::malformed);
+    CHECK(fault(sealed(0x0C, std::string((64 << 10) + 1, '\xC0'))) == DecodeFault::malformed);
 
-    const Decoded newer = decode({"PS\x02\x01", ping[1]}, Role::client, Channel::monitor);
-    CHECK(newer.error().version == 2);
+    const Decoded newer = decode(sealed(1, ping[1], 3), Role::client, Channel::monitor);
+    CHECK(newer.error().version == 3);
     CHECK(newer.error().type == 1);
-    CHECK(newer.error().sentence.find("version 2") != std::string::npos);
+    CHECK(newer.error().sentence.find("version 3") != std::string::npos);
+}
+
+TEST_CASE("a message of which any bit of head or header has flipped is damaged, or not ours") {
+    HashRng rng(7);
+    for (const Message& message : one_of_each(rng)) {
+        const Frames frames = encode(message);
+        for (std::size_t frame = 0; frame < 2; ++frame)
+            for (std::size_t bit = 0; bit < 8 * std::min<std::size_t>(frames[frame].size(), 200); ++bit) {
+                Frames flipped = frames;
+                flipped[frame][bit / 8] = static_cast<char>(flipped[frame][bit / 8] ^ 1 << bit % 8);
+                const Decoded decoded = decode_like(message, std::move(flipped));
+                REQUIRE_FALSE(bool(decoded));
+                const bool in_magic = frame == 0 && bit < 16;
+                CHECK(decoded.error().fault == (in_magic ? DecodeFault::foreign : DecodeFault::damaged));
+            }
+    }
 }
 
 TEST_CASE("both directions of a message that goes both ways are accepted") {
@@ -234,6 +259,8 @@ TEST_CASE("random mutations never crash; what is accepted obeys every limit") {
             if (frame.empty()) continue;
             frame[rng.next_u32() % frame.size()] = static_cast<char>(rng.next_u32());
         }
+        // Whoever forges a message can seal it too.
+        frames[0] = message_head(std::uint8_t(frames[0][2]), std::uint8_t(frames[0][3]), frames[1]);
         if (Decoded decoded = decode_like(message, std::move(frames))) {
             ++accepted;
             (void)encode(*decoded);  // CHECKs every limit.

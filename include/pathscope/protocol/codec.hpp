@@ -27,9 +27,10 @@
 namespace pathscope {
 
 /// Why a message was dropped: section 8 of docs/protocol.md.
-enum class DecodeFault { foreign, version, unknown_type, misplaced, malformed };
+enum class DecodeFault { foreign, damaged, version, unknown_type, misplaced, malformed };
 inline constexpr std::array k_decode_fault_names{
     EnumName<DecodeFault>{DecodeFault::foreign, "foreign"},
+    EnumName<DecodeFault>{DecodeFault::damaged, "damaged"},
     EnumName<DecodeFault>{DecodeFault::version, "version"},
     EnumName<DecodeFault>{DecodeFault::unknown_type, "unknown_type"},
     EnumName<DecodeFault>{DecodeFault::misplaced, "misplaced"},
@@ -71,6 +72,11 @@ class [[nodiscard]] Decoded {
 
 /// `receiver` is the side that decodes, `channel` the socket the frames came from.
 [[nodiscard]] Decoded decode(Frames frames, Role receiver, Channel channel);
+
+/// The first frame of a message with that header: "PS", version, type, and the seal, which is the beginning of the hash of
+/// these four bytes and the header. A bit that flips on the way to a LEASE would otherwise be rendered.
+inline constexpr std::size_t k_seal_bytes = 8;
+[[nodiscard]] std::string message_head(std::uint8_t version, std::uint8_t type, std::string_view header);
 
 [[nodiscard]] MessageType type_of(const Message& message);
 

@@ -17,8 +17,8 @@
 
 namespace pathscope {
 
-inline constexpr std::uint8_t k_protocol_version = 1;
-inline constexpr std::string_view k_input_topic{"PS\x01", 3};  ///< What a server subscribes to on input.
+inline constexpr std::uint8_t k_protocol_version = 2;
+inline constexpr std::string_view k_input_topic{"PS\x02", 3};  ///< What a server subscribes to on input.
 
 enum class MessageType : std::uint8_t {
     hello = 0x01,
