@@ -86,6 +86,7 @@ void ServerMachine::beat() {
 
 TimeNs ServerMachine::next_timer(TimeNs now) const {
     TimeNs next = now + k_idle_wait;
+    if (!linked_) return next;
     if (!relink_reason_.empty()) return now;
     if (phase_ == Phase::hello) {
         next = std::min(next, next_hello_);

@@ -1,0 +1,119 @@
+#pragma once
+/// A client and N servers in virtual time: the real state machines, every message encoded and decoded, over a network that
+/// delays, loses, doubles, damages and parts, with processes that die, freeze, drain, come and start again. Everything
+/// follows from the seed.
+///
+/// After every event:
+///   the ledger's audit holds: each round is counted at most once, no lease is lost (cluster/ledger.hpp);
+///   while work is left and somebody could do it, rounds are committed;
+///   what waits at a server is bounded by its credits.
+/// At the end, after a while without faults:
+///   each pixel of both buffers is what the last state says, to the last bit: nothing lost, doubled or stale;
+///   every server holds the client's state and works on it.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pathscope/session/client_machine.hpp"
+#include "pathscope/session/server_machine.hpp"
+
+#include "simulated_renderer.hpp"
+#include "virtual_time.hpp"
+
+namespace pathscope::testing {
+
+struct ClusterSettings {
+    std::uint32_t seed = 0;
+    int servers = 4;
+    int most_servers = 8;  ///< Joins stop here.
+    int width = 12, height = 8, block = 4;
+    std::uint32_t spp = 6, direct_spp = 2, round_samples = 2;
+    ScheduleKind schedule = ScheduleKind::pull;
+    DetectorKind detector = DetectorKind::adaptive;
+    int min_servers = 0;
+    double samples_per_second = 2000;  ///< Of the client; servers are slower or faster, by up to 8.
+    // Of each message, its chance.
+    float lose = 0, duplicate = 0, damage = 0;
+    double faults_per_second = 0;
+    int new_states = 0;  ///< How often somebody moves the camera.
+    int restarts = 0;    ///< How often the client dies and is started again, from nothing.
+    TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.
+
+    [[nodiscard]] static ClusterSettings from_seed(std::uint32_t seed);
+    [[nodiscard]] std::string describe() const;
+};
+
+/// What happened, so that a test can see that everything did.
+struct ClusterTotals {
+    std::uint64_t events = 0, messages = 0;
+    std::uint64_t lost = 0, doubled = 0, damaged = 0, parted = 0, unreachable = 0;
+    std::uint64_t kills = 0, freezes = 0, partitions = 0, drains = 0, joins = 0, pauses = 0, restarts = 0,
+                  new_states = 0;
+    std::uint64_t bad_messages = 0, deaths = 0;
+    LedgerCounts ledger;
+    TimeNs virtual_time = 0;
+
+    void add(const ClusterTotals& other);
+};
+
+class SimulatedCluster {
+  public:
+    explicit SimulatedCluster(const ClusterSettings& settings);
+    ~SimulatedCluster();
+
+    /// Runs until all is done. Returns what went wrong, or nothing.
+    [[nodiscard]] std::string run();
+
+    [[nodiscard]] const ClusterTotals& totals() const { return totals_; }
+
+  private:
+    class Client;
+    class Server;
+
+    // The world.
+    [[nodiscard]] double uniform() { return rng_.next_float(); }
+    [[nodiscard]] bool chance(double p) { return uniform() < p; }
+    [[nodiscard]] TimeNs soon(double most_seconds) { return from_seconds(uniform() * most_seconds) + 1; }
+    [[nodiscard]] bool calm() const { return time_.now() >= settings_.calm_at; }
+    [[nodiscard]] std::string new_instance();
+    void start_client();
+    void start_server();
+    void plan_faults();
+    void strike();
+
+    /// One way of one connection: messages keep their order.
+    struct Wire {
+        TimeNs last_arrival = 0;
+    };
+    template <class Arrive>
+    void transmit(Wire& wire, Server& server, Frames frames, Arrive arrive);
+    [[nodiscard]] Frames damaged(Frames frames);
+    void to_client(Server& server, Channel channel, Frames frames);
+    [[nodiscard]] bool to_server(Channel channel, const std::string& instance, Frames frames);
+
+    // The oracle.
+    void fail(std::string why);
+    void check_all();
+    void check_progress();
+    void check_end();
+    void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);
+    [[nodiscard]] bool someone_can_work() const;
+    [[nodiscard]] bool done() const;
+
+    ClusterSettings settings_;
+    ClusterTotals totals_;
+    VirtualTime time_;
+    HashRng rng_;
+    std::uint32_t instances_ = 0, sessions_ = 0;
+    std::vector<std::unique_ptr<Client>> clients_;  ///< Dead ones are kept: events may still name them.
+    Client* client_ = nullptr;                      ///< The one that lives.
+    std::vector<std::unique_ptr<Server>> servers_;
+    std::uint64_t committed_ = 0;  ///< Of the client's present epoch, when it last rose.
+    TimeNs last_progress_ = 0;
+    std::string failure_;
+};
+
+}  // namespace pathscope::testing

@@ -1,0 +1,84 @@
+/// The real state machines of client and servers against thousands of seeded worlds (simulated_cluster.hpp).
+///
+///     PATHSCOPE_SEED=17 build/release/test_session -tc="*whatever the network*"       one world, again
+///     PATHSCOPE_SEEDS=100000 ...                                                      more of them
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <mutex>
+#include <string>
+
+#include "pathscope/core/log.hpp"
+#include "pathscope/core/parallel_for.hpp"
+
+#include "simulated_cluster.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+using namespace pathscope::testing;
+
+namespace {
+
+std::uint32_t number_from_environment(const char* name) {
+    const char* const text = std::getenv(name);
+    return text == nullptr ? 0 : std::uint32_t(std::strtoul(text, nullptr, 10));
+}
+
+/// The machines tell people what happens; here nobody reads it.
+class Silence {
+  public:
+    Silence() : before_(set_log_sink([](LogLevel, std::string_view) {})) {}
+    ~Silence() { set_log_sink(before_); }
+
+  private:
+    LogSink before_;
+};
+
+}  // namespace
+
+TEST_CASE("whatever the network does and whoever dies, every sample is in the picture once") {
+    const Silence silence;
+    const std::uint32_t chosen = number_from_environment("PATHSCOPE_SEED");
+    const std::uint32_t asked = number_from_environment("PATHSCOPE_SEEDS");
+    const std::uint32_t seeds = asked != 0 ? asked : k_sanitized ? 200 : 10'000;
+    const std::uint32_t first = chosen != 0 ? chosen : 1;
+    const int count = chosen != 0 ? 1 : int(seeds);
+
+    ClusterTotals all;
+    std::string failures;
+    int failed = 0;
+    std::mutex mutex;
+    parallel_for(count, 0, [&](int i) {
+        const ClusterSettings settings = ClusterSettings::from_seed(first + std::uint32_t(i));
+        SimulatedCluster cluster(settings);
+        const std::string failure = cluster.run();
+        const std::lock_guard lock(mutex);
+        all.add(cluster.totals());
+        if (!failure.empty() && ++failed <= 5)
+            failures += fmt::format("seed {} ({}): {}\n", settings.seed, settings.describe(), failure);
+    });
+    CHECK_MESSAGE(failed == 0, failed, " of ", count, " worlds broke:\n", failures);
+
+    const LedgerCounts& c = all.ledger;
+    MESSAGE(fmt::format(
+        "{} worlds, {} events, {} messages, {:.0f} s of virtual time; messages: {} lost, {} doubled, {} damaged, {} "
+        "parted, {} unreachable, {} refused; processes: {} killed, {} frozen, {} parted, {} drained, {} joined, {} "
+        "pauses and {} restarts of the client, {} new states, {} given up; leases: {} granted, {} expired, {} "
+        "revoked, {} released, {} superseded, {} dropped, {} copied, {} reallocated; results: {} accepted ({} late), "
+        "{} duplicate, {} stale, {} unknown",
+        count, all.events, all.messages, to_seconds(all.virtual_time), all.lost, all.doubled, all.damaged,
+        all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.drains,
+        all.joins, all.pauses, all.restarts, all.new_states, all.deaths, c.granted, c.expired, c.revoked,
+        c.released, c.superseded, c.dropped, c.copied, c.reallocated, c.accepted, c.late, c.duplicates,
+        c.stale, c.unknown));
+    if (chosen != 0) return;
+    // The simulation is worth its name only if everything does happen in it.
+    for (const std::uint64_t happened :
+         {all.lost, all.doubled, all.damaged, all.parted, all.unreachable, all.bad_messages, all.kills,
+          all.freezes, all.partitions, all.drains, all.joins, all.pauses, all.restarts, all.new_states,
+          all.deaths, c.expired, c.revoked, c.released, c.superseded, c.dropped, c.copied, c.reallocated,
+          c.late, c.duplicates, c.stale, c.unknown})
+        CHECK(happened >= 5);
+}
