@@ -3,6 +3,13 @@
 #include <fmt/format.h>
 
 namespace pathscope {
+namespace {
+
+/// The end of a connection is told a moment before, or after, the socket itself knows.
+constexpr int k_probes = 5;
+constexpr TimeNs k_probe_pause = 10 * k_millisecond_ns;
+
+}  // namespace
 
 void ClientMachine::on(Server& server, message::Ping& message) {
     send(Channel::monitor, server.instance,
@@ -16,13 +23,35 @@ void ClientMachine::on(Server& server, message::Pong& message) {
     if (rtt) store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
 }
 
+bool ClientMachine::ping(Server& server) {
+    return send(Channel::monitor, server.instance,
+                message::Ping{std::uint64_t(now_), sequence_, work_.indirect_ledger().rounds_committed(), 0},
+                server.peer.id());
+}
+
+void ClientMachine::on_connection_lost(TimeNs now) {
+    now_ = now;
+    if (config_.detector == DetectorKind::fixed) return;
+    probes_left_ = k_probes;
+    next_probe_ = now_;
+}
+
+/// Who cannot be reached has no connection any more.
+void ClientMachine::probe_connections() {
+    --probes_left_;
+    next_probe_ = now_ + k_probe_pause;
+    std::vector<std::string> unreachable;
+    for (auto& [instance, server] : servers_)
+        if (!ping(server)) unreachable.push_back(instance);
+    for (const std::string& instance : unreachable)
+        lose(instance, PeerCause::lost, "Its connection is gone.");
+}
+
 void ClientMachine::watch_heartbeats() {
     std::vector<std::pair<std::string, std::string>> dead;
     for (auto& [instance, server] : servers_) {
         if (now_ >= server.next_ping) {
-            send(Channel::monitor, instance,
-                 message::Ping{std::uint64_t(now_), sequence_, work_.indirect_ledger().rounds_committed(), 0},
-                 server.peer.id());
+            ping(server);
             server.next_ping = now_ + heartbeat_;
         }
         const Suspicion suspicion = server.detector.assess(now_);

@@ -32,9 +32,10 @@ std::optional<std::string> ClientMachine::reason_to_reject(const std::string& in
 void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello) {
     if (const auto reason = reason_to_reject(instance, hello)) {
         log_warning(fmt::format("Refused the server {}: {}", hello.name, *reason));
-        return send(Channel::monitor, instance,
-                    message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed,
-                                    *reason, 0});
+        send(Channel::monitor, instance,
+             message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed, *reason,
+                             0});
+        return;
     }
     auto found = servers_.find(instance);
     if (found != servers_.end()) {
@@ -44,10 +45,11 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         server.credits.clear();
         step_peer(server, PeerCause::state_lost, "It said HELLO again.");
     } else {
-        if (servers_.size() >= k_max_servers)
-            return send(
-                Channel::monitor, instance,
-                message::Reject{RejectCode::full, "The client has as many servers as it can take.", 5000});
+        if (servers_.size() >= k_max_servers) {
+            send(Channel::monitor, instance,
+                 message::Reject{RejectCode::full, "The client has as many servers as it can take.", 5000});
+            return;
+        }
         const ServerId id{++last_server_};
         found = servers_
                     .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),

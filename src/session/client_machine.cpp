@@ -50,6 +50,7 @@ ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uin
 
 void ClientMachine::on_timers(TimeNs now) {
     now_ = now;
+    if (probes_left_ > 0 && now_ >= next_probe_) probe_connections();
     watch_heartbeats();
     work_.indirect_ledger().expire(now_);
     enforce_time_limit();
@@ -58,6 +59,7 @@ void ClientMachine::on_timers(TimeNs now) {
 
 TimeNs ClientMachine::next_timer(TimeNs now) const {
     TimeNs next = now + k_second_ns;
+    if (probes_left_ > 0) next = std::min(next, next_probe_);
     for (const auto& [instance, server] : servers_) next = std::min(next, server.next_ping);
     if (!servers_.empty()) next = std::min(next, now + heartbeat_ / 4);
     if (const auto deadline = work_.indirect_ledger().next_deadline()) next = std::min(next, *deadline);
@@ -160,7 +162,7 @@ void ClientMachine::ask_who(const std::string& instance) {
     send(Channel::monitor, instance, message::Who{});
 }
 
-void ClientMachine::send(Channel channel, const std::string& instance, Message message, ServerId peer) {
+bool ClientMachine::send(Channel channel, const std::string& instance, Message message, ServerId peer) {
     const bool keeps_events = store_.keeps_events();
     const std::string text = keeps_events ? to_text(message) : std::string();
     const MessageType type = type_of(message);
@@ -172,6 +174,7 @@ void ClientMachine::send(Channel channel, const std::string& instance, Message m
         record(MessageEvent{left ? MessageWay::sent : MessageWay::dropped, name_of(type), name_of(channel),
                             peer, bytes,
                             LongText(left ? text : "The peer is not connected, or does not keep up.")});
+    return left;
 }
 
 // ---- Local servers, and the end.

@@ -58,7 +58,12 @@ Result<void> ClientSession::open_sockets() {
         if (!monitor) return monitor.error();
         auto frames = RouterSocket::bind(context_, endpoint(2, any_port), channel_options(Channel::frames));
         if (!frames) return frames.error();
-        return Sockets{std::move(*input), std::move(*monitor), std::move(*frames)};
+        auto watch_monitor = ConnectionWatch::watch(context_, *monitor);
+        if (!watch_monitor) return watch_monitor.error();
+        auto watch_frames = ConnectionWatch::watch(context_, *frames);
+        if (!watch_frames) return watch_frames.error();
+        return Sockets{std::move(*input), std::move(*monitor), std::move(*frames), std::move(*watch_monitor),
+                       std::move(*watch_frames)};
     };
 
     Result<Sockets> sockets = open(config_.any_ports);
@@ -103,7 +108,8 @@ void ClientSession::step(TimeNs max_wait) {
     std::vector<Pollable> pollables{wake_.pollable()};
     if (sockets_)
         pollables.insert(pollables.end(), {sockets_->monitor.pollable(), sockets_->frames.pollable(),
-                                           sockets_->input.pollable()});
+                                           sockets_->input.pollable(), sockets_->watch_monitor.pollable(),
+                                           sockets_->watch_frames.pollable()});
     const Readable ready = wait_readable(pollables, std::clamp<TimeNs>(next - now, 0, max_wait));
     now = monotonic_now();
     if (now - last_step_ > k_own_pause + max_wait) machine_.on_own_pause(now - last_step_);
@@ -113,6 +119,8 @@ void ClientSession::step(TimeNs max_wait) {
     if (ready[1]) receive(sockets_->monitor, Channel::monitor);
     if (ready[2]) receive(sockets_->frames, Channel::frames);
     if (ready[3]) sockets_->input.count_subscriptions();
+    if (ready[4]) watch(sockets_->watch_monitor);
+    if (ready[5]) watch(sockets_->watch_frames);
     for (RoundOutcome& outcome : runner_.take_finished()) machine_.on_outcome(outcome, monotonic_now());
     watch_local_servers();
     machine_.on_timers(monotonic_now());
@@ -122,6 +130,10 @@ void ClientSession::receive(RouterSocket& socket, Channel channel) {
     drain(socket, k_messages_per_turn, [&](RoutedMessage message) {
         machine_.on_message(message.peer, std::move(message.frames), channel, monotonic_now());
     });
+}
+
+void ClientSession::watch(ConnectionWatch& connections) {
+    if (connections.take_changes().lost > 0) machine_.on_connection_lost(monotonic_now());
 }
 
 void ClientSession::watch_local_servers() {

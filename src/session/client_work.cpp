@@ -100,7 +100,11 @@ void ClientMachine::send_lease(Server& server, const Lease& lease) {
     message.first = lease.first;
     message.count = lease.count;
     message.lease_ms = std::uint32_t(std::clamp<TimeNs>(duration / k_millisecond_ns, 1, 3'600'000));
-    send(Channel::frames, server.instance, std::move(message), server.peer.id());
+    if (send(Channel::frames, server.instance, std::move(message), server.peer.id())) return;
+    // Not connected on frames, for the moment: its next CREDIT will tell that it is again.
+    work_.indirect_ledger().release(lease.id, server.peer.id(), now_);
+    server.credits.settle(lease.id);
+    server.credits.set_limit(0);
 }
 
 /// The client's next own round. Alone it renders both parts, which then grow evenly: of one round together wherever it

@@ -15,6 +15,7 @@ constexpr TimeNs k_dial_time = 20 * k_millisecond_ns;
 /// Without progress though someone could work. Leases that are lost time out one after the other, each later.
 constexpr TimeNs k_longest_wait = 150 * k_second_ns;
 constexpr TimeNs k_longest_run = 5'000 * k_second_ns;
+constexpr std::uint64_t k_most_at_once = 100'000;  ///< Events within a millisecond; more, and somebody spins.
 
 const SceneFile& scene_file() {
     static const SceneFile file = *parse_scene_file(
@@ -174,6 +175,7 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
     void receive(const std::string& instance, Channel channel, Frames frames) {
         machine_.on_message(instance, std::move(frames), channel, time_.now());
     }
+    void connection_lost() { machine_.on_connection_lost(time_.now()); }
     void change_state(RenderState state) { machine_.change_state(std::move(state), nullptr, time_.now()); }
     void pause(TimeNs duration) {
         freeze(time_.now() + duration);
@@ -394,17 +396,14 @@ bool SimulatedCluster::to_server(Channel channel, const std::string& instance, F
 
 void SimulatedCluster::plan_faults() {
     const auto sometime = [&] { return from_seconds(uniform() * to_seconds(settings_.calm_at)); };
-    for (int i = 0; i < settings_.new_states; ++i)
-        time_.at(sometime(), [this] {
-            --settings_.new_states;
-            client_->when_awake([this] {
-                RenderState state = client_->machine().state();
-                ++state.settings.seed;
-                state.settings.width = std::max(1, state.settings.width + int(rng_.next_u32() % 5) - 2);
-                ++totals_.new_states;
-                client_->change_state(std::move(state));
-            });
-        });
+    // Somebody drags the camera: several states, one soon after the other.
+    for (int drags = std::exchange(settings_.new_states, 0); drags > 0; --drags) {
+        const TimeNs begun = sometime();
+        const int steps = 1 + int(rng_.next_u32() % 6);
+        settings_.new_states += steps;
+        for (int step = 0; step < steps; ++step)
+            time_.at(begun + step * 15 * k_millisecond_ns, [this] { move_camera(); });
+    }
     for (int i = 0; i < settings_.restarts; ++i)
         time_.at(sometime(), [this] {
             ++totals_.restarts;
@@ -412,6 +411,18 @@ void SimulatedCluster::plan_faults() {
             start_client();
         });
     if (settings_.faults_per_second > 0) time_.at(soon(1), [this] { strike(); });
+}
+
+void SimulatedCluster::move_camera() {
+    --settings_.new_states;
+    client_->when_awake([this] {
+        RenderState state = client_->machine().state();
+        ++state.settings.seed;
+        if (chance(0.3))
+            state.settings.width = std::max(1, state.settings.width + int(rng_.next_u32() % 5) - 2);
+        ++totals_.new_states;
+        client_->change_state(std::move(state));
+    });
 }
 
 void SimulatedCluster::strike() {
@@ -434,6 +445,10 @@ void SimulatedCluster::strike() {
     if (kind < 0.25) {
         ++totals_.kills;
         server.kill();
+        // Its connections close, and that is told soon; unless the cable is cut as well.
+        if (!server.parted())
+            time_.at(time_.now() + soon(0.005),
+                     [this] { client_->when_awake([this] { client_->connection_lost(); }); });
     } else if (kind < 0.6) {
         ++totals_.freezes;
         server.freeze(until);
@@ -455,6 +470,7 @@ std::string SimulatedCluster::run() {
     while (!time_.empty() && time_.next() <= end && failure_.empty()) {
         time_.step();
         ++totals_.events;
+        check_pace();
         check_all();
         if (done() && end == k_longest_run) end = std::max(time_.now(), settings_.calm_at) + k_epilogue;
     }
@@ -495,15 +511,45 @@ void SimulatedCluster::check_all() {
     check_progress();
 }
 
+/// A timer that is always due is a process that takes a core and does nothing.
+void SimulatedCluster::check_pace() {
+    if (time_.now() / k_millisecond_ns != millisecond_) {
+        millisecond_ = time_.now() / k_millisecond_ns;
+        events_before_ = totals_.events;
+    }
+    if (totals_.events - events_before_ > k_most_at_once) fail("somebody's timer is due again and again");
+}
+
 void SimulatedCluster::check_progress() {
     const std::uint64_t committed = client_->machine().work().indirect_ledger().rounds_committed();
     const bool moved = std::exchange(committed_, committed) != committed;
+    if (moved) check_light();
     if (moved || done() || client_->machine().complete() || !someone_can_work() || !calm())
         last_progress_ = time_.now();
     if (time_.now() - last_progress_ > k_longest_wait)
         fail(fmt::format("no round was committed for {:.0f} s though somebody could work; {} of {} are",
                          to_seconds(k_longest_wait), committed,
                          client_->machine().work().indirect_ledger().rounds()));
+}
+
+/// The indirect light so far is that of the rounds that are committed, and of no other state.
+void SimulatedCluster::check_light() {
+    const FrameWork& work = client_->machine().work();
+    const Ledger& ledger = work.indirect_ledger();
+    const std::uint32_t seed = client_->machine().state().settings.seed;
+    for (std::uint32_t unit = 0; unit < ledger.plan().units; ++unit) {
+        const UnitSnapshot committed = ledger.snapshot(unit);
+        const PixelRect rect = work.rect_of(unit);
+        PixelSum expected;  // Of the block's first pixel: a round has all of its pixels or none.
+        for (std::uint32_t round = 0; round < committed.reached; ++round) {
+            if (std::binary_search(committed.missing.begin(), committed.missing.end(), round)) continue;
+            const SampleRange samples = samples_of_round(ledger.plan(), {unit, round});
+            for (std::uint32_t s = samples.first; s < samples.first + samples.count; ++s)
+                expected += light_of(seed, LightPart::indirect, rect.x, rect.y, s);
+        }
+        if (work.indirect().sum_at(rect.x, rect.y) != expected)
+            return fail(fmt::format("the light of block {} is not that of its committed rounds", unit));
+    }
 }
 
 void SimulatedCluster::check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp) {
@@ -527,9 +573,16 @@ void SimulatedCluster::check_end() {
     check_picture(LightPart::indirect, machine.work().indirect(), machine.state().settings.spp);
     check_picture(LightPart::direct, machine.work().direct(), machine.state().settings.direct_spp);
     const Digest wanted = state_hash(machine.state());
+    int alive = 0;
     for (const auto& server : servers_)
-        if (server->runs() && !server->draining() && server->machine().working_on() != wanted)
-            fail("a server does not hold the client's state at the end");
+        if (server->runs() && !server->draining()) {
+            ++alive;
+            if (server->machine().working_on() != wanted)
+                fail("a server does not hold the client's state at the end");
+        }
+    if (machine.progress().servers_ready != alive)
+        fail(fmt::format("{} servers are alive at the end, and the client would give work to {}", alive,
+                         machine.progress().servers_ready));
 }
 
 }  // namespace pathscope::testing

@@ -5,6 +5,7 @@
 ///
 /// After every event:
 ///   the ledger's audit holds: each round is counted at most once, no lease is lost (cluster/ledger.hpp);
+///   each block's indirect light is that of its committed rounds, to the last bit;
 ///   while work is left and somebody could do it, rounds are committed;
 ///   what waits at a server is bounded by its credits.
 /// At the end, after a while without faults:
@@ -38,8 +39,8 @@ struct ClusterSettings {
     // Of each message, its chance.
     float lose = 0, duplicate = 0, damage = 0;
     double faults_per_second = 0;
-    int new_states = 0;  ///< How often somebody moves the camera.
-    int restarts = 0;    ///< How often the client dies and is started again, from nothing.
+    int new_states = 0;                ///< How often somebody drags the camera.
+    int restarts = 0;                  ///< How often the client dies and is started again, from nothing.
     TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.
 
     [[nodiscard]] static ClusterSettings from_seed(std::uint32_t seed);
@@ -82,6 +83,7 @@ class SimulatedCluster {
     void start_client();
     void start_server();
     void plan_faults();
+    void move_camera();
     void strike();
 
     /// One way of one connection: messages keep their order.
@@ -97,8 +99,10 @@ class SimulatedCluster {
     // The oracle.
     void fail(std::string why);
     void check_all();
+    void check_pace();
     void check_progress();
     void check_end();
+    void check_light();
     void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);
     [[nodiscard]] bool someone_can_work() const;
     [[nodiscard]] bool done() const;
@@ -113,6 +117,8 @@ class SimulatedCluster {
     std::vector<std::unique_ptr<Server>> servers_;
     std::uint64_t committed_ = 0;  ///< Of the client's present epoch, when it last rose.
     TimeNs last_progress_ = 0;
+    TimeNs millisecond_ = 0;
+    std::uint64_t events_before_ = 0;
     std::string failure_;
 };
 

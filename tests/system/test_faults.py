@@ -35,10 +35,14 @@ class Run:
         return [int(pid) for pid in children.read_text().split()]
 
     def working_servers(self, count):
-        """Waits until so many servers are at work: their own CPU time says so, the scene loads in no time."""
+        """Waits until so many of its own servers are at work."""
+        return self.wait_until_busy(self.servers, count)
+
+    def wait_until_busy(self, processes, count):
+        """Their own CPU time says so; the scene loads in no time."""
         limit = time.monotonic() + PATIENCE_S
         while time.monotonic() < limit and self.process.poll() is None:
-            busy = [pid for pid in self.servers() if cpu_seconds(pid) > 0.4]
+            busy = [pid for pid in processes() if cpu_seconds(pid) > 0.4]
             if len(busy) >= count:
                 return busy
             time.sleep(0.005)
@@ -48,9 +52,9 @@ class Run:
         return self.process.communicate(timeout=PATIENCE_S)[1]
 
     def finish(self):
-        text = self.finish_text()
+        self.said = self.finish_text()
         if self.process.returncode != 0:
-            raise AssertionError(f"exit code {self.process.returncode}: {text}")
+            raise AssertionError(f"exit code {self.process.returncode}: {self.said}")
         return json.loads(self.stats_file.read_text())
 
 
@@ -93,6 +97,20 @@ class Faults(unittest.TestCase):
         stats = run.finish()
         self.check(stats, died=1)
         self.assertGreaterEqual(stats["reallocated"], 1)
+
+    def test_kill_9_of_another_machines_server(self):
+        """It is no child of the client: the end of its connection alone tells, long before heartbeats would."""
+        ports = "7665,7666,7667"
+        run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
+        run.working_servers(1)
+        environment = dict(os.environ, XDG_CACHE_HOME=self.folder)
+        other = subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", "other", "--quiet"], env=environment)
+        run.wait_until_busy(lambda: [other.pid], 1)
+        other.kill()
+        other.wait()
+        stats = run.finish()
+        self.check(stats, died=1)
+        self.assertIn("other is lost: Its connection is gone.", run.said)
 
     def test_frozen(self):
         run = Run(self.folder, "--servers", "3")

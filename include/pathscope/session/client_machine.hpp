@@ -78,6 +78,10 @@ class ClientMachine {
     void on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now);
     void on_outcome(RoundOutcome& outcome, TimeNs now);
 
+    /// Some connection ended; whose is not known. A process that died is unreachable then, and is given up at once: but not
+    /// with the detector `fixed`, which is that of the classic system.
+    void on_connection_lost(TimeNs now);
+
     /// This process itself did not run for so long: that silence proves nothing about servers.
     void on_own_pause(TimeNs pause);
 
@@ -137,7 +141,8 @@ class ClientMachine {
     void count_dropped(ServerId server, std::string_view sentence, Channel channel);
     void reject_undecodable(const std::string& instance, const DecodeError& error, Channel channel);
     void ask_who(const std::string& instance);
-    void send(Channel channel, const std::string& instance, Message message, ServerId peer = k_local_server);
+    /// False if the peer is not connected.
+    bool send(Channel channel, const std::string& instance, Message message, ServerId peer = k_local_server);
     void record(EventBody body);
     void enforce_time_limit();
     template <class Other>
@@ -160,6 +165,8 @@ class ClientMachine {
     // client_heartbeats.cpp: who lives.
     void on(Server& server, message::Ping& message);
     void on(Server& server, message::Pong& message);
+    bool ping(Server& server);
+    void probe_connections();
     void watch_heartbeats();
 
     // client_work.cpp: leases out, light in.
@@ -198,6 +205,8 @@ class ClientMachine {
     bool reached_min_servers_ = false;
     bool announced_alone_ = false;
     std::map<std::string, TimeNs> who_asked_;  ///< Unknown peers, bounded.
+    int probes_left_ = 0;                      ///< Of connections, after one was lost.
+    TimeNs next_probe_ = 0;
 
     FrameWork work_;
     std::uint64_t last_ticket_ = 0;

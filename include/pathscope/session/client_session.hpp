@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "pathscope/net/connection_watch.hpp"
 #include "pathscope/net/context.hpp"
 #include "pathscope/net/publisher.hpp"
 #include "pathscope/net/router.hpp"
@@ -56,6 +57,7 @@ class ClientSession : private ClientWorld {
         PublisherSocket input;
         RouterSocket monitor;
         RouterSocket frames;
+        ConnectionWatch watch_monitor, watch_frames;
     };
     struct LocalServer {
         ChildProcess process;
@@ -67,6 +69,7 @@ class ClientSession : private ClientWorld {
     Result<void> open_sockets();
     Result<void> start_local_servers();
     void receive(RouterSocket& socket, Channel channel);
+    void watch(ConnectionWatch& connections);
     void watch_local_servers();
 
     // The world, as the machine sees it.
