@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
@@ -59,6 +60,8 @@ Result<std::unique_ptr<ClientSession>> ClientSession::create(const ClientConfig&
     if (!wake) return wake.error();
     std::unique_ptr<ClientSession> session(
         new ClientSession(config, std::move(job), store, std::move(*wake)));
+    if (const auto file = std::exchange(session->job_.resume, std::nullopt))
+        if (const auto resumed = session->resume(*file); !resumed) return resumed.error();
     if (config.local_servers > 0 || config.listens)
         if (const auto opened = session->open_sockets(); !opened) return opened.error();
     if (const auto started = session->start_local_servers(); !started) return started.error();
@@ -81,6 +84,13 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
     state_hash_ = hash_text(packed_state_);
     work_.begin(job_.state.settings, Epoch{1}, started_);
     servers_changed();
+}
+
+Result<void> ClientSession::resume(const CheckpointFile& file) {
+    if (const auto taken = take_up(file, job_.state, work_, store_); !taken) return taken;
+    saturated_ = file.history().saturated;
+    dropped_ = file.history().dropped;
+    return {};
 }
 
 ClientSession::~ClientSession() {

@@ -26,6 +26,7 @@
 #include "pathscope/net/router.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/child_process.hpp"
 #include "pathscope/session/client_config.hpp"
 #include "pathscope/session/frame_work.hpp"
@@ -38,8 +39,9 @@ namespace pathscope {
 /// What to render.
 struct ClientJob {
     RenderState state;
-    std::shared_ptr<const Scene> scene;  ///< Of state.scene, files and options.
-    SceneDepot depot;                    ///< Of the same files.
+    std::shared_ptr<const Scene> scene;                   ///< Of state.scene, files and options.
+    SceneDepot depot;                                     ///< Of the same files.
+    std::optional<CheckpointFile> resume = std::nullopt;  ///< Go on from there.
 };
 
 /// What people watch.
@@ -115,6 +117,7 @@ class ClientSession {
     };
 
     ClientSession(const ClientConfig& config, ClientJob job, EventStore& store, WakePair wake);
+    Result<void> resume(const CheckpointFile& file);
     Result<void> open_sockets();
     Result<void> start_local_servers();
 
