@@ -37,6 +37,13 @@ void sync_folder(const std::filesystem::path& folder) {
     ::close(descriptor);
 }
 
+/// Where a file is written before it gets its name. Two threads may write the same file: each has its own part.
+std::filesystem::path part_of(std::filesystem::path path) {
+    static std::atomic<unsigned> parts{0};
+    path += fmt::format("{}{}-{}", k_part, ::getpid(), parts.fetch_add(1));
+    return path;
+}
+
 /// "<process>-<number>"
 bool is_part_number(std::string_view text) {
     const std::size_t dash = text.find('-');
@@ -69,9 +76,7 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 }
 
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes) {
-    static std::atomic<unsigned> writes{0};  // Two threads may write the same file: each has its own part.
-    std::filesystem::path part = path;
-    part += fmt::format("{}{}-{}", k_part, ::getpid(), writes.fetch_add(1));
+    const std::filesystem::path part = part_of(path);
     const auto give_up = [&]() -> Result<void> {
         const std::string why = reason();
         std::error_code ignored;
@@ -104,16 +109,16 @@ Result<void> check_place(const std::filesystem::path& path) {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored))
         return bad_input(fmt::format("{} is a folder; name a file.", path.string()));
-    std::filesystem::path probe = path;
-    probe += fmt::format(".probe{}", ::getpid());
-    if (const auto made = write_file_atomically(probe, ""); !made) {
+    const std::filesystem::path part = part_of(path);
+    if (const FileHandle file(std::fopen(part.c_str(), "wb")); !file) {
+        const std::string why = reason();
         const std::filesystem::path folder = folder_of(path);
         if (!std::filesystem::is_directory(folder, ignored))
             return bad_input(fmt::format("Cannot write {}: there is no folder {}; make it first.",
                                          path.string(), folder.string()));
-        return made.error();
+        return bad_input(fmt::format("Cannot write {}: {}.", path.string(), why));
     }
-    std::filesystem::remove(probe, ignored);
+    std::filesystem::remove(part, ignored);
     return {};
 }
 

@@ -18,7 +18,7 @@ namespace pathscope {
 /// place cannot be written to.
 [[nodiscard]] Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-/// Removes what write_file_atomically left beside `path` when its program was killed. Requires: no other program writes
+/// Removes what the functions around this one left beside `path` when their program was killed. Requires: no other program writes
 /// `path`; it would have to write it again.
 void remove_abandoned_parts(const std::filesystem::path& path);
 
