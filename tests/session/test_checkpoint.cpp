@@ -9,6 +9,7 @@
 
 #include "pathscope/core/files.hpp"
 #include "pathscope/core/hash.hpp"
+#include "pathscope/wire/codec.hpp"
 #include "session/checkpoint_frames.hpp"
 
 #include "testing.hpp"
@@ -243,7 +244,25 @@ TEST_CASE("the bytes of a file have the order that the document says") {
     const auto map = unpack(std::string_view(file).substr(16, header));
     REQUIRE(bool(map));
     CHECK(*map->get<PackMap>()->find("block") == PackValue(4));
+    const auto document = read_file("docs/checkpoints.md");
+    REQUIRE(bool(document));
+    const auto is_documented = [&](const PackMap& fields) {
+        for (const auto& [key, value] : fields.entries())
+            CHECK_MESSAGE(document->find("`" + key + "`") != std::string::npos, key);
+    };
+    is_documented(*map->get<PackMap>());
+    is_documented(*map->get<PackMap>()->find("direct")->get<PackMap>());
     CHECK(sealed_again(file) == file);
+
+    // The arrays of direct light, small enough to be a piece each: reached, then (of none) missing, then sums.
+    std::size_t at = 16 + header;
+    for (const std::size_t words : {15, 18 * 11 * 3}) {
+        const std::size_t size = byte(at) | byte(at + 1) << 8 | byte(at + 2) << 16 | byte(at + 3) << 24;
+        const auto array = unpack_bytes(Codec(byte(at + 4)), file.substr(at + 5, size), words * 8);
+        REQUIRE(bool(array));
+        CHECK(*array == std::string(words * 8, '\0'));
+        at += 5 + size;
+    }
 }
 
 TEST_CASE(

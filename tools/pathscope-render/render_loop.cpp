@@ -66,7 +66,7 @@ Result<void> RenderLoop::run(const std::atomic<bool>& interrupted) {
         write_if_due();
         if (interrupted.load()) return give_up();
     }
-    if (const auto written = write_last(); !written)
+    if (const auto written = write_last(); !written && !writer_->failing())
         log_warning(fmt::format("{} The picture is finished all the same.", written.error().message));
     return {};
 }

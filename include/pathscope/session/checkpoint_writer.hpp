@@ -61,6 +61,8 @@ class CheckpointWriter {
         return write().outcome;
     }
 
+    /// The last one in the background could not be written, and that has been said.
+    [[nodiscard]] bool failing() const { return failing_; }
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
   private:
