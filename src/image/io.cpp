@@ -1,7 +1,6 @@
 #include "pathscope/image/io.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -81,22 +80,7 @@ Result<void> check_picture_size(std::int64_t width, std::int64_t height, std::st
 
 Result<void> check_writable(const std::filesystem::path& path) {
     if (const auto format = format_of(path); !format) return format.error();
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
-        return bad_input(fmt::format("{} is a folder; name a file.", path.string()));
-
-    // The one question that permissions, full disks and read-only mounts all answer: can a file be made there?
-    std::filesystem::path probe = path;
-    probe += fmt::format(".probe{}", ::getpid());
-    if (const auto made = write_file_atomically(probe, ""); !made) {
-        const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-        if (!std::filesystem::is_directory(folder, ignored))
-            return bad_input(fmt::format("Cannot write {}: there is no folder {}; make it first.",
-                                         path.string(), folder.string()));
-        return made.error();
-    }
-    std::filesystem::remove(probe, ignored);
-    return {};
+    return check_place(path);
 }
 
 Result<void> save_image(const std::filesystem::path& path, std::span<const ImageLayer> layers,

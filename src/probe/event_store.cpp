@@ -39,6 +39,12 @@ void EventStore::count_all(std::initializer_list<Count> counts, ServerId server)
     }
 }
 
+void EventStore::count_earlier(std::initializer_list<Count> counts) {
+    if (!keeps_counters()) return;
+    const std::lock_guard lock(mutex_);
+    for (const auto& [counter, n] : counts) totals_[static_cast<std::size_t>(counter)] += n;
+}
+
 void EventStore::add_latency(Latency what, TimeNs duration, ServerId server) {
     if (!keeps_counters()) return;
     const std::lock_guard lock(mutex_);

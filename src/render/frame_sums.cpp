@@ -1,5 +1,9 @@
 #include "pathscope/render/frame_sums.hpp"
 
+#include <fmt/format.h>
+
+#include <utility>
+
 namespace pathscope {
 
 FrameSums::FrameSums(const BlockGrid& grid, Quantum quantum)
@@ -7,6 +11,25 @@ FrameSums::FrameSums(const BlockGrid& grid, Quantum quantum)
       quantum_(quantum),
       sums_(std::size_t(grid.width()) * std::size_t(grid.height())),
       samples_(grid.count(), 0) {}
+
+Result<FrameSums> FrameSums::restored(const BlockGrid& grid, Quantum quantum, std::vector<PixelSum> sums,
+                                      std::vector<std::uint32_t> samples) {
+    CHECK(samples.size() == grid.count(), samples.size(), grid.count());
+    FrameSums frame;
+    frame.grid_ = grid;
+    frame.quantum_ = quantum;
+    frame.sums_ = std::move(sums);
+    frame.samples_ = std::move(samples);
+    if (frame.sums_.size() != std::size_t(grid.width()) * std::size_t(grid.height()))
+        return bad_input(fmt::format("It has the sums of {} pixels, but the frame has {}x{}.",
+                                     frame.sums_.size(), grid.width(), grid.height()));
+    for (int y = 0; y < grid.height(); ++y)
+        for (int x = 0; x < grid.width(); ++x)
+            if (const auto n = frame.samples_[grid.block_at(x, y)]; !in_range(frame.sum_at(x, y), n))
+                return bad_input(fmt::format(
+                    "The sum of pixel ({}, {}) is beyond what its {} samples can add up to.", x, y, n));
+    return frame;
+}
 
 void FrameSums::add(const Round& round, std::span<const PixelSum> sums) {
     CHECK(grid_.holds(round) && sums.size() == std::size_t(round.rect.area()), round.block, sums.size());

@@ -46,6 +46,13 @@ ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uin
     servers_changed();
 }
 
+Result<void> ClientMachine::resume(const CheckpointFile& file) {
+    if (const auto taken = take_up(file, job_.state, work_, store_); !taken) return taken;
+    saturated_ = file.history().saturated;
+    dropped_ = file.history().dropped;
+    return {};
+}
+
 // ---- Time.
 
 void ClientMachine::on_timers(TimeNs now) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
@@ -29,8 +30,11 @@ Result<std::unique_ptr<ClientSession>> ClientSession::create(const ClientConfig&
                                                              EventStore& store) {
     Result<WakePair> wake = WakePair::create();
     if (!wake) return wake.error();
+    const std::optional<CheckpointFile> file = std::exchange(job.resume, std::nullopt);
     std::unique_ptr<ClientSession> session(
         new ClientSession(config, std::move(job), store, std::move(*wake)));
+    if (file)
+        if (const auto resumed = session->machine_.resume(*file); !resumed) return resumed.error();
     if (config.local_servers > 0 || config.listens)
         if (const auto opened = session->open_sockets(); !opened) return opened.error();
     if (const auto started = session->start_local_servers(); !started) return started.error();

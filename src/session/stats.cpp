@@ -35,6 +35,15 @@ Json servers_json(const EventStore& store) {
     return servers;
 }
 
+Json resumed_json(const std::optional<WorkHistory>& history) {
+    if (!history) return {};
+    return {{"runs", history->runs},
+            {"rounds", history->rounds},
+            {"samples", history->samples},
+            {"rays", history->rays},
+            {"render_s", history->render_s}};
+}
+
 }  // namespace
 
 SamplesPerPixel summary_of(const Plane& samples) {
@@ -91,7 +100,8 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"servers", servers_json(store)},
               {"client",
                {{"samples", local ? local->total(Counter::samples) : 0},
-                {"rays", local ? local->total(Counter::rays) : 0}}}};
+                {"rays", local ? local->total(Counter::rays) : 0}}},
+              {"resumed", resumed_json(figures.resumed)}};
     // The counters have one name everywhere; those above have the units that people expect.
     for (const auto& [counter, name] : k_counter_names)
         if (!json.contains(name)) json[std::string(name)] = total(counter);

@@ -64,6 +64,27 @@ TEST_CASE("files are written whole and read whole, errors name the path") {
     CHECK_FALSE(bool(write_file_atomically(folder / "no" / "x", "")));
 }
 
+TEST_CASE("a place for a file is tried without a trace, and what killed programs left is found by its name") {
+    const testing::TemporaryFolder temporary;
+    const std::filesystem::path& folder = temporary.path();
+    const auto path = folder / "f";
+    CHECK(bool(check_place(path)));
+    CHECK(std::filesystem::is_empty(folder));
+    REQUIRE(bool(write_file_atomically(path, "kept")));
+    CHECK(bool(check_place(path)));
+    CHECK(*read_file(path) == "kept");
+    CHECK(check_place(folder).error().message.find("is a folder") != std::string::npos);
+    CHECK(check_place(folder / "no" / "f").error().message.find("make it first") != std::string::npos);
+
+    for (const char* name : {"f.part7-0", "f.part123-45", "f.part7", "f.part-1", "f.part7-x", "g.part7-0"})
+        REQUIRE(bool(write_file_atomically(folder / name, "")));
+    remove_abandoned_parts(path);
+    CHECK(!std::filesystem::exists(folder / "f.part7-0"));
+    CHECK(!std::filesystem::exists(folder / "f.part123-45"));
+    CHECK(std::distance(std::filesystem::directory_iterator(folder), {}) == 5);
+    remove_abandoned_parts(folder / "no" / "f");
+}
+
 TEST_CASE("a log sink receives what stderr would") {
     std::string seen;
     const LogSink before = set_log_sink([&](LogLevel level, std::string_view text) {

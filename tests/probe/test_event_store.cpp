@@ -103,6 +103,16 @@ TEST_CASE("totals are exact however small the ring, and those of the servers add
     CHECK_FALSE(store.server(ServerId{7}).has_value());
 }
 
+TEST_CASE("what earlier runs counted is in the totals, and no server's") {
+    EventStore store;
+    store.count(Counter::rays, 5, ServerId{1});
+    store.count_earlier({{Counter::rays, 100}, {Counter::samples, 7}});
+    CHECK(store.total(Counter::rays) == 105);
+    CHECK(store.total(Counter::samples) == 7);
+    REQUIRE(store.servers().size() == 1);
+    CHECK(store.servers()[0].total(Counter::rays) == 5);
+}
+
 TEST_CASE("servers beyond the limit count in the overall totals only") {
     EventStore store(ProbeLevel::counters, {.events = 4, .servers = 2});
     for (std::uint32_t id = 1; id <= 5; ++id) {

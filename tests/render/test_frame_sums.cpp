@@ -1,6 +1,7 @@
 #include "pathscope/render/frame_sums.hpp"
 
 #include <algorithm>
+#include <string>
 
 #include "pathscope/math/random.hpp"
 
@@ -73,4 +74,27 @@ TEST_CASE("samples are counted by block") {
     const Plane samples = frame.samples();
     for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 5; ++x) CHECK(samples.at(x, y) == (grid.rect(4).contains(x, y) ? 12.0f : 0.0f));
+}
+
+TEST_CASE("sums from a file are the same frame, unless they are beyond what their samples can add up to") {
+    const BlockGrid grid(5, 3, 2);
+    FrameSums frame(grid, Quantum{-4});
+    std::vector<std::uint32_t> samples;
+    for (std::uint32_t block = 0; block < grid.count(); ++block) {
+        frame.add(grid.round(block, 0, 1 + block), some_sums(grid.round(block, 0, 1 + block)));
+        samples.push_back(1 + block);
+    }
+    const std::vector<PixelSum> sums(frame.sums().begin(), frame.sums().end());
+    const auto again = FrameSums::restored(grid, Quantum{-4}, sums, samples);
+    REQUIRE(bool(again));
+    CHECK(again->mean().pixels == frame.mean().pixels);
+    CHECK(again->samples().pixels == frame.samples().pixels);
+
+    for (const std::int64_t wrong : {std::int64_t{-1}, k_max_quanta + 1}) {
+        std::vector<PixelSum> bad = sums;
+        bad[1].g = wrong;  // Of block 0, which has one sample.
+        CHECK(FrameSums::restored(grid, Quantum{-4}, bad, samples).error().message.find("(1, 0)") !=
+              std::string::npos);
+    }
+    CHECK(!FrameSums::restored(grid, Quantum{-4}, {}, samples));
 }

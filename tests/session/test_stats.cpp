@@ -69,6 +69,24 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
     CHECK(json["rays_per_s"] == 0);  // And not a division by no time, which JSON cannot say.
 }
 
+TEST_CASE("a run that went on says from what, and its figures are those of both") {
+    EventStore store;
+    store.count(Counter::samples, 60, ServerId{1});
+    store.count(Counter::samples, 10);
+    store.count_earlier({{Counter::samples, 30}});
+    RunFigures figures;
+    figures.render_s = 20;
+    CHECK(Json::parse(stats_json(small_state(), store, figures))["resumed"].is_null());
+    figures.resumed = WorkHistory{2, 12, 5, 6, 7, 30, 0, 0, {}};
+    const Json json = Json::parse(stats_json(small_state(), store, figures));
+    CHECK(json["resumed"] ==
+          Json{{"runs", 2}, {"rounds", 5}, {"samples", 30}, {"rays", 7}, {"render_s", 12.0}});
+    CHECK(json["samples"] == 100);
+    CHECK(json["samples_per_s"] == 5);
+    CHECK(json["client"]["samples"] == 10);
+    CHECK(json["servers"][0]["samples"] == 60);
+}
+
 TEST_CASE("the numbers are those of the store, each counter under its own key") {
     EventStore store;
     for (std::size_t i = 0; i < k_counters; ++i)

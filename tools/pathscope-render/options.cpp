@@ -121,6 +121,30 @@ void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) 
     app.add_option("--trace", options.trace, "write a time line for ui.perfetto.dev")->type_name("FILE");
 }
 
+void add_checkpoint_options(CLI::App& app, RenderOptions& options) {
+    CheckpointOptions& checkpoint = options.checkpoint;
+    const auto write =
+        app.add_option("--checkpoint", checkpoint.write, "write what is rendered so far to this new file")
+            ->type_name("FILE");
+    const auto resume =
+        app.add_option("--resume", checkpoint.resume, "go on from this checkpoint")->type_name("FILE");
+    app.add_option_function<std::string>(
+           "--continue",
+           [&](const std::string& file) {
+               checkpoint.write = checkpoint.resume = file;
+               checkpoint.resume_if_there = true;
+           },
+           "--checkpoint FILE, and --resume FILE if it is there")
+        ->excludes(write)
+        ->excludes(resume)
+        ->type_name("FILE");
+    app.add_option_function<double>(
+           "--checkpoint-every", [&](double seconds) { checkpoint.every = from_seconds(seconds); },
+           fmt::format("between two checkpoints ({:g})", to_seconds(checkpoint.every)))
+        ->check(CLI::Range(0.01, 1e6))
+        ->type_name("SECONDS");
+}
+
 bool is_loopback(const std::string& host) {
     return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
 }
@@ -159,6 +183,7 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     add_image_options(app, options);
     add_lever(app, "--setting", setting, "all levers at once");
     add_levers(app, options);
+    add_checkpoint_options(app, options);
     add_cluster_options(app, options, insecure);
 
     auto text = parse_arguments(app, argc, argv);
@@ -167,6 +192,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
 
     options.mesh_cache = mesh_cache_of(options.client.local_server_mesh_cache, SceneCache::default_folder());
     if (const auto fits = check_sampling(options); !fits) return fits.error();
+    if (app.count("--checkpoint-every") > 0 && !options.checkpoint.write)
+        return bad_input("--checkpoint-every: no checkpoint is written; add --checkpoint or --continue.");
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (options.client.listens) {
         if (!is_loopback(options.client.host) && !insecure)

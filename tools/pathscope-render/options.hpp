@@ -11,9 +11,17 @@
 #include "pathscope/core/result.hpp"
 #include "pathscope/render/render_settings.hpp"
 #include "pathscope/scene/load.hpp"
+#include "pathscope/session/checkpoint_writer.hpp"
 #include "pathscope/session/client_config.hpp"
 
 namespace pathscope {
+
+/// Where a run begins, and how it can be gone on with.
+struct CheckpointOptions {
+    std::optional<std::filesystem::path> write, resume;
+    bool resume_if_there = false;  ///< Else `resume` must be there.
+    TimeNs every = k_default_checkpoint_interval;
+};
 
 /// What was asked for. Where nothing was said, the scene's defaults decide (run.cpp).
 struct RenderOptions {
@@ -31,6 +39,7 @@ struct RenderOptions {
     std::vector<std::string> buffers;
     std::optional<float> exposure_ev;
     std::optional<std::filesystem::path> trace, stats;
+    CheckpointOptions checkpoint;
 };
 
 /// Names for --buffers.

@@ -25,8 +25,10 @@ class ProgressLine {
         last_ = now;
         drawn_ = true;
         const double done = (progress.direct + progress.indirect) / 2;
-        const double elapsed = to_seconds(now - begin_);
-        const std::string left = done > 0.01 ? fmt::format("{:.0f} s left", elapsed / done - elapsed) : "";
+        if (begun_with_ < 0) begun_with_ = done;  // A resumed frame begins with something.
+        const double gained = done - begun_with_;
+        const std::string left =
+            gained > 0.01 ? fmt::format("{:.0f} s left", to_seconds(now - begin_) * (1 - done) / gained) : "";
         const std::string who = progress.waiting ? "waiting for servers"
                                 : progress.alone ? "alone"
                                                  : fmt::format("{} servers", progress.servers_ready);
@@ -41,6 +43,7 @@ class ProgressLine {
     bool shown_;
     bool drawn_ = false;
     TimeNs begin_;
+    double begun_with_ = -1;
     TimeNs last_ = 0;
 };
 

@@ -16,12 +16,11 @@
 #include "pathscope/sampling/sampler.hpp"
 #include "pathscope/session/client_session.hpp"
 #include "pathscope/session/stats.hpp"
-#include "progress_line.hpp"
+#include "render_loop.hpp"
 
 namespace pathscope {
 namespace {
 
-constexpr TimeNs k_longest_step = 200 * k_millisecond_ns;
 constexpr std::uint32_t k_default_spp = 16;
 constexpr int k_default_width = 640;
 
@@ -128,25 +127,15 @@ ClientConfig complete_config(const RenderOptions& options) {
     return config;
 }
 
-Result<void> render(ClientSession& session, const std::atomic<bool>& interrupted) {
-    ProgressLine line;
-    const auto& endpoints = session.endpoints();
-    if (session.progress().waiting)
-        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST",
-                             endpoints[1]));
-    while (!session.complete()) {
-        session.step(k_longest_step);
-        line.show(session.progress());
-        if (interrupted.load()) return failed("Interrupted; nothing was written.");
-    }
-    return {};
-}
-
 }  // namespace
 
 Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& interrupted) {
     const TimeNs begin = monotonic_now();
     if (const auto ok = check_outputs(options); !ok) return ok;
+    Result<std::optional<CheckpointFile>> resume = open_checkpoint(options.checkpoint);
+    if (!resume) return resume.error();
+    RunFigures figures;
+    if (*resume) figures.resumed = (*resume)->history();
 
     Result<OpenedScene> opened = open_scene(options.scene, options.scene_options, options.mesh_cache);
     if (!opened) return opened.error();
@@ -161,10 +150,13 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
 
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
-    auto session = ClientSession::create(complete_config(options),
-                                         {*state, shared_scene, SceneDepot(*opened->files)}, store);
+    auto session =
+        ClientSession::create(complete_config(options),
+                              {*state, shared_scene, SceneDepot(*opened->files), std::move(*resume)}, store);
     if (!session) return session.error();
-    if (const auto done = render(**session, interrupted); !done) return done;
+    const WorkHistory earlier = figures.resumed.value_or(WorkHistory{});
+    RenderLoop loop(**session, store, options.checkpoint, earlier, built);
+    if (const auto done = loop.run(interrupted); !done) return done;
     const TimeNs rendered = monotonic_now();
 
     // The picture, and what was asked for beside it.
@@ -183,10 +175,9 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     for (const auto& output : options.outputs)
         if (const auto saved = save_image(output, layers, save); !saved) return saved;
 
-    RunFigures figures;
     figures.load_s = to_seconds(loaded - begin);
     figures.build_s = to_seconds(built - loaded);
-    figures.render_s = to_seconds(rendered - built);
+    figures.render_s = earlier.render_s + to_seconds(rendered - built);
     figures.threads = options.client.threads > 0 ? options.client.threads : hardware_threads();
     figures.memory = memory_of(*shared_scene);
     figures.image_hash = image_hash(buffers.frame.combined);

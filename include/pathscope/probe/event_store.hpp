@@ -93,6 +93,9 @@ class EventStore {
     };
     void count_all(std::initializer_list<Count> counts, ServerId server = k_local_server);
 
+    /// What other runs counted before, which this one goes on from: in the overall totals, and of no server.
+    void count_earlier(std::initializer_list<Count> counts);
+
     /// Negative durations (clocks of two machines) count as 0.
     void add_latency(Latency what, TimeNs duration, ServerId server);
 

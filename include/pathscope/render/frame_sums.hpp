@@ -23,6 +23,12 @@ class FrameSums {
     FrameSums() = default;
     FrameSums(const BlockGrid& grid, Quantum quantum);
 
+    /// Sums from a file. An error unless there is one per pixel, each in_range for the samples of its block.
+    /// Requires: a number of samples for each block.
+    [[nodiscard]] static Result<FrameSums> restored(const BlockGrid& grid, Quantum quantum,
+                                                    std::vector<PixelSum> sums,
+                                                    std::vector<std::uint32_t> samples);
+
     /// Adds a round. Requires: grid().holds(round), one sum per pixel of the rect, each in_range for round.count, and
     /// the block's samples stay within k_max_samples_per_pixel.
     void add(const Round& round, std::span<const PixelSum> sums);
@@ -32,6 +38,7 @@ class FrameSums {
     [[nodiscard]] const PixelSum& sum_at(int x, int y) const {
         return sums_[std::size_t(y) * std::size_t(grid_.width()) + std::size_t(x)];
     }
+    [[nodiscard]] std::span<const PixelSum> sums() const { return sums_; }  ///< Row by row.
     [[nodiscard]] std::uint32_t samples_of_block(std::uint32_t block) const { return samples_[block]; }
     [[nodiscard]] Image mean() const;  ///< Black where there is no sample.
     [[nodiscard]] Plane samples() const;

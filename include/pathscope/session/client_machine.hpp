@@ -24,6 +24,7 @@
 #include "pathscope/cluster/peer.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/client_config.hpp"
 #include "pathscope/session/frame_work.hpp"
 #include "pathscope/session/render_state.hpp"
@@ -35,8 +36,9 @@ namespace pathscope {
 /// What to render.
 struct ClientJob {
     RenderState state;
-    std::shared_ptr<const Scene> scene;  ///< Of state.scene, files and options.
-    SceneDepot depot;                    ///< Of the same files.
+    std::shared_ptr<const Scene> scene;                   ///< Of state.scene, files and options.
+    SceneDepot depot;                                     ///< Of the same files.
+    std::optional<CheckpointFile> resume = std::nullopt;  ///< Go on from there.
 };
 
 /// What people watch.
@@ -69,6 +71,9 @@ class ClientMachine {
     /// session: random, not 0; tells this run from an earlier one. `store` and `world` outlive the machine.
     ClientMachine(const ClientConfig& config, ClientJob job, std::uint64_t session, EventStore& store,
                   ClientWorld& world, TimeNs now);
+
+    /// Takes up a checkpoint; an error if it is of other work. Requires: nothing has happened yet.
+    [[nodiscard]] Result<void> resume(const CheckpointFile& file);
 
     // -- What happens ---------------------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@
 #include "pathscope/integrator/path_estimator.hpp"
 #include "pathscope/render/frame_sums.hpp"
 #include "pathscope/render/render_settings.hpp"
+#include "pathscope/session/frame_snapshot.hpp"
 
 namespace pathscope {
 
@@ -94,6 +95,17 @@ class FrameWork {
     /// No more rounds: what is there makes the image.
     void stop();
 
+    [[nodiscard]] const WorkPlan& plan() const { return plan_; }
+    [[nodiscard]] const BlockGrid& grid() const { return grid_; }
+
+    /// What there is, into a place that may be used again: a copy of all sums is most of the cost.
+    void snapshot(FrameSnapshot& into) const;
+
+    /// Takes over what another run had of this frame. More samples than it was to have, or fewer, are fine without
+    /// passes, as long as each committed round is one of this plan as well; else, and for what cannot be, an error, and
+    /// the frame has to be begun anew. Requires: begin() was called, and no round granted since.
+    [[nodiscard]] Result<void> restore(FrameSnapshot snapshot);
+
   private:
     struct Part {
         Ledger ledger;
@@ -114,6 +126,10 @@ class FrameWork {
     [[nodiscard]] PassGoal goal_of(const Part& part) const;
     [[nodiscard]] LedgerPlan plan_of(std::uint32_t samples) const;
     void open_pass(Part& part);
+    void open_rounds(Part& part, std::uint32_t scout);
+    void snapshot(const Part& part, PartSnapshot& into) const;
+    Result<void> restore(Part& part, PartSnapshot snapshot);
+    Result<void> restore_pass(Part& part, PartSnapshot& snapshot);
     void measure(Part& part) const;
     void finish_passes();
     [[nodiscard]] double summed_squared_error(const Part& part) const;

@@ -15,6 +15,7 @@
 #include "pathscope/image/image.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/scene/scene.hpp"
+#include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/render_state.hpp"
 
 namespace pathscope {
@@ -36,7 +37,8 @@ struct SceneMemory {
 
 /// What the store does not know.
 struct RunFigures {
-    double wall_s = 0, load_s = 0, build_s = 0, render_s = 0;
+    double wall_s = 0, load_s = 0, build_s = 0;
+    double render_s = 0;  ///< Of all runs that worked on the frame, as all counters of the totals.
     int threads = 0;
     SceneMemory memory;
     Digest image_hash{};
@@ -44,6 +46,7 @@ struct RunFigures {
     SamplesPerPixel samples_per_pixel;      ///< As the layer `spp` has them.
     std::uint64_t saturated = 0;
     std::vector<DroppedSample> dropped;  ///< Some of those counted as nonfinite_dropped.
+    std::optional<WorkHistory> resumed;  ///< What earlier runs had done, if this one went on from them.
 };
 
 [[nodiscard]] std::string stats_json(const RenderState& state, const EventStore& store,
