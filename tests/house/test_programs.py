@@ -14,7 +14,8 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parent.parent.parent
 DOCUMENT = (PROJECT / "docs" / "programs.md").read_text(encoding="utf-8")
 PROGRAMS = None  # from the command line
-REQUIRED = {"pathscope-render": ["scene.json", "-o", "image.png"], "pathscope-bench": ["bvh"]}
+REQUIRED = {"pathscope-render": ["scene.json", "-o", "image.png"], "pathscope-bench": ["bvh"],
+            "pathscope-chaos": ["--listen", "127.0.0.1:0", "--connect", "127.0.0.1:1"]}
 
 
 def run(program, *arguments):
@@ -59,6 +60,18 @@ class Programs(unittest.TestCase):
                          "1", "--stats", stats)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertEqual(first_cells(section("What --stats writes")), set(json.loads(stats.read_text())))
+
+    def test_keys_of_the_relays_statistics(self):
+        with tempfile.TemporaryDirectory(prefix="pathscope_stats_") as folder:
+            stats = Path(folder) / "stats.json"
+            relay = subprocess.Popen([PROGRAMS / "pathscope-chaos", *REQUIRED["pathscope-chaos"], "--stats", stats],
+                                     stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+            relay.stdout.readline()
+            relay.terminate()
+            relay.communicate()
+            written = json.loads(stats.read_text())
+            keys = {*written, *written["links"][0], *written["links"][0]["up"]}
+            self.assertEqual(first_cells(section("What pathscope-chaos --stats writes")), keys)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,61 @@
+#pragma once
+/// Plain TCP sockets that never block, as far as the chaos relay needs them.
+///
+/// Everything else in this module speaks ZeroMQ; the relay passes on bytes it does not understand, and so
+/// must stand below it. Source: tcp(7), socket(7), getaddrinfo(3).
+/// Thread safety: yes, for different sockets.
+
+#include <sys/socket.h>
+
+#include <string>
+
+#include "pathscope/core/result.hpp"
+
+namespace pathscope {
+
+/// Owns a file descriptor.
+class Descriptor {
+  public:
+    Descriptor() = default;
+    explicit Descriptor(int number) : number_(number) {}
+    Descriptor(Descriptor&& other) noexcept;
+    Descriptor& operator=(Descriptor&& other) noexcept;
+    ~Descriptor();
+
+    [[nodiscard]] int get() const { return number_; }
+    explicit operator bool() const { return number_ >= 0; }
+
+  private:
+    int number_ = -1;
+};
+
+struct TcpAddress {
+    sockaddr_storage storage{};
+    socklen_t size = 0;
+
+    [[nodiscard]] int port() const;
+    void set_port(int port);
+    [[nodiscard]] bool is_loopback() const;
+};
+
+/// The first address of a name, or of digits as in "127.0.0.1" and "::1". May ask a name server, and wait
+/// for it.
+[[nodiscard]] Result<TcpAddress> resolve_tcp(const std::string& host);
+
+/// Port 0: any free one; tcp_address_of() tells which.
+[[nodiscard]] Result<Descriptor> listen_tcp(const TcpAddress& address);
+[[nodiscard]] TcpAddress tcp_address_of(const Descriptor& socket);
+
+/// Nothing if no connection waits (or, with errno EMFILE and the like, none can be taken).
+[[nodiscard]] Descriptor accept_tcp(const Descriptor& listener);
+
+/// Begins to connect. Once the socket can be written to, tcp_error_of() says whether it stands. Nothing if it
+/// failed at once.
+[[nodiscard]] Descriptor begin_connect_tcp(const TcpAddress& address);
+[[nodiscard]] int tcp_error_of(const Descriptor& socket);  ///< 0, or an errno that has not been told yet.
+
+/// Closes so that the peer sees a reset (RST) instead of an end (FIN): what is under way is lost, at both
+/// ends.
+void reset_tcp(Descriptor& socket);
+
+}  // namespace pathscope
