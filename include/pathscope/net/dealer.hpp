@@ -34,6 +34,7 @@ class DealerSocket {
     /// The next message that is waiting, if any. Never blocks.
     [[nodiscard]] std::optional<Frames> receive();
 
+    [[nodiscard]] const SocketHandle& handle() const { return socket_; }
     [[nodiscard]] Pollable pollable() const { return {socket_.get()}; }
 
     /// Ready when send() would deliver: as soon as the connection stands. Only for while one waits to send.
