@@ -60,21 +60,33 @@ TEST_CASE("a dialler on the list gets in") {
 
 namespace {
 
-/// Whether attempts to connect are refused for this reason, in the end, and none succeeds. Whoever notices first hangs
-/// up, so that one side may see nothing but that now and then.
-bool refused_for(RefusalReason expected, ConnectionWatch& watch) {
-    bool refused = false, accepted = false, otherwise = false;
-    (void)soon(watch, [&] {
-        const ConnectionChanges changes = watch.take_changes();
-        accepted = accepted || changes.accepted > 0;
+/// Dials until both sides have told that they were refused for the expected reasons. Whoever notices first hangs up, so
+/// one of them may see nothing but that now and then. False when anything else is seen, or nothing.
+bool both_are_told(const Context& context, RouterSocket& router, const Security& dialler,
+                   RefusalReason at_listener, RefusalReason at_dialler) {
+    auto listening = ConnectionWatch::watch(context, router);
+    bool listener_told = false, dialler_told = false;
+    const auto take = [](const ConnectionChanges& changes, RefusalReason expected, bool& told) {
         for (const Refusal& refusal : changes.refusals) {
-            refused = refused || refusal.reason == expected;
-            otherwise =
-                otherwise || (refusal.reason != expected && refusal.reason != RefusalReason::broke_off);
+            told = told || refusal.reason == expected;
+            if (refusal.reason != expected && refusal.reason != RefusalReason::broke_off) return false;
         }
-        return refused || accepted || otherwise;
-    });
-    return refused && !accepted && !otherwise;
+        return changes.accepted == 0;
+    };
+    for (int attempt = 0; attempt < 200 && !(listener_told && dialler_told); ++attempt) {
+        auto dialling = DealerSocket::connect_watched(context, router.endpoint(), "d", with(dialler));
+        bool refused_here = false, good = true;
+        const bool ended = soon(dialling->watch, [&] {
+            const ConnectionChanges here = dialling->watch.take_changes();
+            refused_here = refused_here || !here.refusals.empty();
+            good = good && take(here, at_dialler, dialler_told) &&
+                   take(listening->take_changes(), at_listener, listener_told);
+            return refused_here || !good;
+        });
+        if (!ended || !good) return false;
+        if (dialling->dealer.send({"x"}) != SendOutcome::would_block) return false;
+    }
+    return listener_told && dialler_told && !router.receive();
 }
 
 }  // namespace
@@ -85,38 +97,20 @@ TEST_CASE(
     const Context context;
     const KeyPair client = make_key_pair(), server = make_key_pair(), stranger = make_key_pair();
     REQUIRE(bool(admit_only(context, {server.public_key})));
-    struct Case {
-        Security security;
-        RefusalReason at_listener, at_dialler;
-    };
-    for (const Case& c :
-         {Case{{}, RefusalReason::one_sided, RefusalReason::one_sided},
-          Case{Dialler{stranger, client.public_key}, RefusalReason::unlisted_key,
-               RefusalReason::unlisted_key},
-          Case{Dialler{server, stranger.public_key}, RefusalReason::wrong_key, RefusalReason::broke_off}}) {
-        CAPTURE(name_of(c.at_listener));
-        auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*", with(Listener{client}));
-        REQUIRE(bool(router));
-        auto watch = ConnectionWatch::watch(context, *router);
-        REQUIRE(bool(watch));
-        SocketOptions options = with(c.security);
-        options.reconnect_ms = 20;  // The first attempt may be over before the dialler's watch begins.
-        auto dealer = DealerSocket::connect(context, router->endpoint(), "d", options);
-        REQUIRE(bool(dealer));
-        auto own_watch = ConnectionWatch::watch(context, *dealer);
-        REQUIRE(bool(own_watch));
-        CHECK(refused_for(c.at_listener, *watch));
-        CHECK(refused_for(c.at_dialler, *own_watch));
-        CHECK(dealer->send({"x"}) == SendOutcome::would_block);
-        CHECK_FALSE(router->receive().has_value());
-    }
+    auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*", with(Listener{client}));
+    REQUIRE(bool(router));
+    CHECK(both_are_told(context, *router, {}, RefusalReason::one_sided, RefusalReason::one_sided));
+    CHECK(both_are_told(context, *router, Dialler{stranger, client.public_key}, RefusalReason::unlisted_key,
+                        RefusalReason::unlisted_key));
+    CHECK(both_are_told(context, *router, Dialler{server, stranger.public_key}, RefusalReason::wrong_key,
+                        RefusalReason::broke_off));
+
     const std::vector<RefusedKey> refused = take_refused_keys(context);
     REQUIRE_FALSE(refused.empty());
     CHECK(refused.front().public_key == stranger.public_key);
     CHECK(refused.front().address == "127.0.0.1");
 
     // The door is still open to those who may enter.
-    auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*", with(Listener{client}));
     auto dealer =
         DealerSocket::connect(context, router->endpoint(), "e", with(Dialler{server, client.public_key}));
     REQUIRE(send_once_connected(*dealer, {"x"}) == SendOutcome::delivered);
@@ -131,14 +125,8 @@ TEST_CASE("who has keys does not talk to a listener without, and both are told w
     const Context context;
     const KeyPair client = make_key_pair(), server = make_key_pair();
     auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*");
-    auto watch = ConnectionWatch::watch(context, *router);
-    SocketOptions options = with(Dialler{server, client.public_key});
-    options.reconnect_ms = 20;
-    auto dealer = DealerSocket::connect(context, router->endpoint(), "d", options);
-    auto own_watch = ConnectionWatch::watch(context, *dealer);
-    CHECK(refused_for(RefusalReason::one_sided, *own_watch));
-    CHECK(refused_for(RefusalReason::one_sided, *watch));
-    CHECK_FALSE(router->receive().has_value());
+    CHECK(both_are_told(context, *router, Dialler{server, client.public_key}, RefusalReason::one_sided,
+                        RefusalReason::one_sided));
 }
 
 TEST_CASE("who is taken off the list is heard no more, named, and disconnected") {

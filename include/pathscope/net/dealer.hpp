@@ -12,6 +12,7 @@
 
 #include "pathscope/core/frames.hpp"
 #include "pathscope/core/result.hpp"
+#include "pathscope/net/connection_watch.hpp"
 #include "pathscope/net/context.hpp"
 #include "pathscope/net/socket.hpp"
 
@@ -21,12 +22,21 @@ namespace pathscope {
 /// zero for peers that named none.
 [[nodiscard]] std::string random_routing_id();
 
+struct WatchedDealer;
+
 class DealerSocket {
   public:
     /// Returns at once: the peer need not be there yet. Requires: routing_id as above (1 to 255 bytes).
     [[nodiscard]] static Result<DealerSocket> connect(const Context& context, const std::string& endpoint,
                                                       const std::string& routing_id,
                                                       const SocketOptions& options = {});
+
+    /// The same, watched from before the first attempt: after a handshake that one side refuses, ZeroMQ does not try
+    /// again, and says so only here. Whoever wants to has to connect anew.
+    [[nodiscard]] static Result<WatchedDealer> connect_watched(const Context& context,
+                                                               const std::string& endpoint,
+                                                               const std::string& routing_id,
+                                                               const SocketOptions& options = {});
 
     /// delivered or would_block. Never blocks. Takes the frames only when `delivered`. Requires: a frame.
     [[nodiscard]] SendOutcome send(Frames&& frames);
@@ -41,7 +51,15 @@ class DealerSocket {
     [[nodiscard]] Pollable sendable() const { return {socket_.get(), -1, true}; }
 
   private:
+    [[nodiscard]] static Result<DealerSocket> open(const Context& context, const std::string& routing_id,
+                                                   const SocketOptions& options);
+
     SocketHandle socket_;
+};
+
+struct WatchedDealer {
+    DealerSocket dealer;
+    ConnectionWatch watch;
 };
 
 }  // namespace pathscope
