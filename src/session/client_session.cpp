@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
@@ -98,12 +97,14 @@ Result<void> ClientSession::open_sockets() {
         return any_port ? fmt::format("tcp://{}:*", config_.host)
                         : fmt::format("tcp://{}:{}", config_.host, config_.ports[channel]);
     };
+    Result<Door> door = Door::open(context_, config_);
+    if (!door) return door.error();
     const auto open = [&](bool any_port) -> Result<Sockets> {
-        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), channel_options(Channel::input));
+        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), door->options(Channel::input));
         if (!input) return input.error();
-        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), channel_options(Channel::monitor));
+        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), door->options(Channel::monitor));
         if (!monitor) return monitor.error();
-        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), channel_options(Channel::frames));
+        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), door->options(Channel::frames));
         if (!frames) return frames.error();
         return Sockets{std::move(*input), std::move(*monitor), std::move(*frames)};
     };
@@ -114,6 +115,9 @@ Result<void> ClientSession::open_sockets() {
     if (moved) sockets = open(true);
     if (!sockets) return sockets.error();
     sockets_ = std::move(*sockets);
+    door_ = std::move(*door);
+    const auto watched = door_->watch(sockets_->input, sockets_->monitor, sockets_->frames);
+    if (!watched) return watched.error();
     endpoints_ = {sockets_->input.endpoint(), sockets_->monitor.endpoint(), sockets_->frames.endpoint()};
     for (std::size_t i = 0; i < endpoints_.size(); ++i)
         config_.ports[i] = std::stoi(endpoints_[i].substr(endpoints_[i].rfind(':') + 1));
@@ -135,6 +139,7 @@ Result<void> ClientSession::start_local_servers() {
             "--quiet"};
         if (!config_.local_server_mesh_cache.empty())
             arguments.insert(arguments.end(), {"--mesh-cache", config_.local_server_mesh_cache});
+        for (std::string& argument : door_->arguments_of_local_server(i)) arguments.push_back(std::move(argument));
         auto process = ChildProcess::start(config_.server_program, arguments);
         if (!process) return process.error();
         local_servers_.push_back({std::move(*process), name});
@@ -166,6 +171,7 @@ void ClientSession::step(TimeNs max_wait) {
     for (RoundOutcome& outcome : runner_.take_finished()) on_outcome(outcome);
 
     now = monotonic_now();
+    watch_door(now);
     watch_local_servers();
     watch_heartbeats(now);
     work_.indirect_ledger().expire(now);
@@ -434,6 +440,15 @@ void ClientSession::watch_heartbeats(TimeNs now) {
         server.credits.write_off(now);
     }
     for (const auto& [instance, why] : dead) lose(instance, PeerCause::lost, why);
+}
+
+/// Who was turned away is counted; who was taken off the list is given up at once.
+void ClientSession::watch_door(TimeNs now) {
+    if (!door_) return;
+    if (const std::uint64_t refused = door_->step(now, sockets_->input)) store_.count(Counter::refused_peers, refused);
+    for (RouterSocket* socket : {&sockets_->monitor, &sockets_->frames})
+        for (const std::string& instance : socket->take_revoked())
+            lose(instance, PeerCause::lost, "Its key was taken off the list.");
 }
 
 void ClientSession::watch_local_servers() {

@@ -58,8 +58,13 @@ void ServerSession::request_stop() noexcept {
 
 Result<void> ServerSession::run() {
     while (!ended_ && !stop_requested_.load()) {
-        if (!link_)
+        if (!link_) {
+            if (monotonic_now() < redial_.next()) {
+                wait_to_dial();
+                continue;
+            }
             if (const auto dialled = dial(); !dialled) return dialled;
+        }
         step();
     }
     if (refusal_) return *refusal_;
@@ -69,28 +74,45 @@ Result<void> ServerSession::run() {
 
 // ---- The link.
 
+/// After a refusal. Results that come meanwhile belong to a client that is gone; step() clears them away.
+void ServerSession::wait_to_dial() {
+    if (wait_readable({wake_.pollable()}, redial_.next() - monotonic_now())[0]) wake_.clear();
+}
+
 Result<void> ServerSession::dial() {
     const std::string instance = random_routing_id();
     // Input first: what is published after WELCOME was made must not be missed if it can be helped.
     auto input = SubscriberSocket::connect(context_, endpoint(config_, 0), std::string(k_input_topic),
-                                           channel_options(Channel::input));
+                                           channel_options(Channel::input, config_.security));
     if (!input) return input.error();
-    auto monitor =
-        DealerSocket::connect(context_, endpoint(config_, 1), instance, channel_options(Channel::monitor));
+    auto monitor = DealerSocket::connect_watched(context_, endpoint(config_, 1), instance,
+                                                 channel_options(Channel::monitor, config_.security));
     if (!monitor) return monitor.error();
-    auto frames =
-        DealerSocket::connect(context_, endpoint(config_, 2), instance, channel_options(Channel::frames));
+    auto frames = DealerSocket::connect(context_, endpoint(config_, 2), instance,
+                                        channel_options(Channel::frames, config_.security));
     if (!frames) return frames.error();
-    link_.emplace(Link{instance, std::move(*input), std::move(*monitor), std::move(*frames)});
+    link_.emplace(Link{instance, std::move(*input), std::move(monitor->dealer), std::move(monitor->watch),
+                       std::move(*frames)});
     phase_ = Phase::hello;
     hello_pause_ = k_first_hello_pause;
     next_hello_ = last_heard_ = monotonic_now();
     return {};
 }
 
+/// Refused at the door: it says so, and dials anew after a pause, as ZeroMQ does not.
+void ServerSession::on_connection_changes() {
+    for (const Refusal& refusal : link_->watch.take_changes().refusals) {
+        const auto sentence =
+            redial_.on_refused(refusal.reason, endpoint(config_, 1), config_.security, monotonic_now());
+        if (sentence) log_warning(fmt::format("{}: {}", config_.name, *sentence));
+        relink_ = true;
+        relink_reason_.clear();
+    }
+}
+
 /// Forgets everything about this client but the scene, which the next one may want as well.
 void ServerSession::lose_link(std::string_view why) {
-    log_note(fmt::format("{}: {} Dialling {} again.", config_.name, why, config_.host));
+    if (!why.empty()) log_note(fmt::format("{}: {} Dialling {} again.", config_.name, why, config_.host));
     runner_.cancel_all();
     leases_.clear();
     unsent_answers_.clear();
@@ -105,12 +127,14 @@ void ServerSession::lose_link(std::string_view why) {
 void ServerSession::step() {
     const TimeNs now = monotonic_now();
     const Readable ready = wait_readable(
-        {wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(), link_->input.pollable()},
+        {wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(), link_->input.pollable(),
+         link_->watch.pollable()},
         next_timer(now) - now);
     if (ready[0]) wake_.clear();
     if (ready[1]) receive(link_->monitor, Channel::monitor);
     if (ready[2]) receive(link_->frames, Channel::frames);
     if (ready[3]) receive(link_->input, Channel::input);
+    if (ready[4]) on_connection_changes();
     for (LoadedScene& loaded : loaded_.take_all()) on_loaded(loaded);
     for (RoundOutcome& outcome : runner_.take_finished()) on_outcome(outcome);
     on_timers(monotonic_now());
@@ -181,6 +205,7 @@ void ServerSession::on_timers(TimeNs now) {
 
 void ServerSession::on(message::Welcome& message) {
     if (session_ != 0 && session_ != message.session) return;
+    redial_.on_welcome();
     session_ = message.session;
     credits_ = message.credits;
     heartbeat_ = TimeNs(message.heartbeat_ms) * k_millisecond_ns;

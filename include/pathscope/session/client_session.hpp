@@ -28,6 +28,7 @@
 #include "pathscope/protocol/codec.hpp"
 #include "pathscope/session/child_process.hpp"
 #include "pathscope/session/client_config.hpp"
+#include "pathscope/session/door.hpp"
 #include "pathscope/session/frame_work.hpp"
 #include "pathscope/session/render_state.hpp"
 #include "pathscope/session/round_runner.hpp"
@@ -146,6 +147,7 @@ class ClientSession {
                                                               const message::Hello& hello) const;
     void step_peer(Server& server, PeerCause cause, std::string_view detail);
     void lose(const std::string& instance, PeerCause cause, std::string_view why);
+    void watch_door(TimeNs now);
     void watch_local_servers();
     void watch_heartbeats(TimeNs now);
     void servers_changed();
@@ -173,6 +175,7 @@ class ClientSession {
     EventStore& store_;
     Context context_;
     WakePair wake_;
+    std::optional<Door> door_;
     std::optional<Sockets> sockets_;
     std::array<std::string, 3> endpoints_;
 

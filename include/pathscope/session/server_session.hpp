@@ -25,6 +25,7 @@
 #include "pathscope/net/wake_pair.hpp"
 #include "pathscope/protocol/codec.hpp"
 #include "pathscope/session/client_config.hpp"
+#include "pathscope/session/refusal.hpp"
 #include "pathscope/session/render_state.hpp"
 #include "pathscope/session/round_runner.hpp"
 #include "pathscope/session/scene_cache.hpp"
@@ -36,6 +37,7 @@ namespace pathscope {
 struct ServerConfig {
     std::string host = "127.0.0.1";  ///< Of the client.
     std::array<int, 3> ports = k_default_ports;
+    Security security;  ///< A Dialler, or none.
     std::string name;  ///< For people; empty = host name and process id.
     int threads = 0;   ///< 0 = all cores.
     TreeKind tree = TreeKind::wide;
@@ -63,6 +65,7 @@ class ServerSession {
         std::string instance;
         SubscriberSocket input;
         DealerSocket monitor;
+        ConnectionWatch watch;  ///< Of monitor; the others share its fate.
         DealerSocket frames;
     };
     struct LoadedScene {
@@ -79,7 +82,9 @@ class ServerSession {
 
     explicit ServerSession(ServerConfig config, WakePair wake);
 
+    void wait_to_dial();
     Result<void> dial();
+    void on_connection_changes();
     void lose_link(std::string_view why);
     void step();
     [[nodiscard]] TimeNs next_timer(TimeNs now) const;
@@ -125,6 +130,7 @@ class ServerSession {
     bool ended_ = false;  ///< The client said stop, or refused us for good.
     std::optional<Error> refusal_;
 
+    Redial redial_;
     std::optional<Link> link_;
     Phase phase_ = Phase::hello;
     bool draining_ = false;
