@@ -44,7 +44,9 @@ double Conduct::points(const std::string& who, TimeNs now) const {
     return found == records_.end() ? 0 : decayed(found->second, now);
 }
 
-bool Conduct::may_send(const std::string& who, TimeNs now) { return record_of(who, now).allowance.allow(now); }
+bool Conduct::may_send(const std::string& who, TimeNs now) {
+    return record_of(who, now).allowance.allow(now);
+}
 
 Conduct::Record& Conduct::record_of(const std::string& who, TimeNs now) {
     const auto found = records_.find(who);
@@ -59,9 +61,8 @@ void Conduct::make_room(TimeNs now) {
         const Record& record = entry.second;
         return std::tuple(record.ban.left(now), bans_remembered(record, now), decayed(record, now));
     };
-    records_.erase(std::min_element(records_.begin(), records_.end(), [&](const auto& a, const auto& b) {
-        return weight(a) < weight(b);
-    }));
+    records_.erase(std::min_element(records_.begin(), records_.end(),
+                                    [&](const auto& a, const auto& b) { return weight(a) < weight(b); }));
 }
 
 double Conduct::decayed(const Record& record, TimeNs now) const {

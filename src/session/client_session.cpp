@@ -139,7 +139,8 @@ Result<void> ClientSession::start_local_servers() {
             "--quiet"};
         if (!config_.local_server_mesh_cache.empty())
             arguments.insert(arguments.end(), {"--mesh-cache", config_.local_server_mesh_cache});
-        for (std::string& argument : door_->arguments_of_local_server(i)) arguments.push_back(std::move(argument));
+        for (std::string& argument : door_->arguments_of_local_server(i))
+            arguments.push_back(std::move(argument));
         auto process = ChildProcess::start(config_.server_program, arguments);
         if (!process) return process.error();
         local_servers_.push_back({std::move(*process), name});
@@ -445,7 +446,8 @@ void ClientSession::watch_heartbeats(TimeNs now) {
 /// Who was turned away is counted; who was taken off the list is given up at once.
 void ClientSession::watch_door(TimeNs now) {
     if (!door_) return;
-    if (const std::uint64_t refused = door_->step(now, sockets_->input)) store_.count(Counter::refused_peers, refused);
+    if (const std::uint64_t refused = door_->step(now, sockets_->input))
+        store_.count(Counter::refused_peers, refused);
     for (RouterSocket* socket : {&sockets_->monitor, &sockets_->frames})
         for (const std::string& instance : socket->take_revoked())
             lose(instance, PeerCause::lost, "Its key was taken off the list.");

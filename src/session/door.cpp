@@ -47,10 +47,10 @@ Result<Door> Door::open(const Context& context, const ClientConfig& config) {
     Door door(context);
     if (!config.keys) {
         if (reaches_other_machines(fmt::format("tcp://{}:1", config.host)))
-            log_warning(
-                fmt::format("Insecure: whoever reaches {} can take part in this render, see the scene and read "
-                            "what is sent.",
-                            config.host));
+            log_warning(fmt::format(
+                "Insecure: whoever reaches {} can take part in this render, see the scene and read "
+                "what is sent.",
+                config.host));
         return door;
     }
     door.keys_ = config.keys->pair;
@@ -90,7 +90,8 @@ SocketOptions Door::options(Channel channel) const {
     return options;
 }
 
-Result<void> Door::watch(const PublisherSocket& input, const RouterSocket& monitor, const RouterSocket& frames) {
+Result<void> Door::watch(const PublisherSocket& input, const RouterSocket& monitor,
+                         const RouterSocket& frames) {
     std::vector<ConnectionWatch> watches;
     const auto add = [&](const auto& socket) -> Result<void> {
         auto watch = ConnectionWatch::watch(context_, socket);
@@ -113,8 +114,8 @@ std::vector<std::string> Door::arguments_of_local_server(int index) const {
 
 std::uint64_t Door::step(TimeNs now, PublisherSocket& input) {
     if (list_ && list_->changed(now)) {
-        log_note(fmt::format("The list of those who may come in has changed; it has {} key{}.", list_->keys().size(),
-                             list_->keys().size() == 1 ? "" : "s"));
+        log_note(fmt::format("The list of those who may come in has changed; it has {} key{}.",
+                             list_->keys().size(), list_->keys().size() == 1 ? "" : "s"));
         CHECK(bool(admit()));  // The list holds keys only.
         input.disconnect_unlisted();
     }

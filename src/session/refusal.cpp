@@ -8,8 +8,8 @@
 namespace pathscope {
 
 std::string refusal_at_client(const RefusedKey& refused) {
-    return fmt::format("Refused a server at {}: its public key {} is not on the list (--allow).", refused.address,
-                       refused.public_key);
+    return fmt::format("Refused a server at {}: its public key {} is not on the list (--allow).",
+                       refused.address, refused.public_key);
 }
 
 std::string refusal_at_client(const Refusal& refusal, const std::string& own_key) {
@@ -18,8 +18,8 @@ std::string refusal_at_client(const Refusal& refusal, const std::string& own_key
             case RefusalReason::unlisted_key:
                 return "its public key is not on the list (--allow).";
             case RefusalReason::wrong_key:
-                return fmt::format("it takes another public key for this client's, which is {} (--server-key).",
-                                   own_key);
+                return fmt::format(
+                    "it takes another public key for this client's, which is {} (--server-key).", own_key);
             case RefusalReason::one_sided:
                 return own_key.empty() ? "it wants encryption, and this client was started without --key."
                                        : "it speaks without encryption; it needs --key and --server-key.";
@@ -40,9 +40,10 @@ std::string refusal_at_server(RefusalReason reason, const std::string& where, co
     const auto why = [&]() -> std::string {
         switch (reason) {
             case RefusalReason::unlisted_key:
-                return fmt::format("it does not know this server's key. Its user may add this line to the file of "
-                                   "--allow: {}",
-                                   keys ? keys->keys.public_key : "");
+                return fmt::format(
+                    "it does not know this server's key. Its user may add this line to the file of "
+                    "--allow: {}",
+                    keys ? keys->keys.public_key : "");
             case RefusalReason::one_sided:
                 return keys ? "it speaks without encryption. Start it with --key and --allow."
                             : "it wants encryption. Start this server with --key and --server-key.";
@@ -52,7 +53,8 @@ std::string refusal_at_server(RefusalReason reason, const std::string& where, co
             case RefusalReason::broke_off:
                 break;
         }
-        return keys ? "it hung up in the middle of the handshake. Most likely --server-key is not its public key."
+        return keys ? "it hung up in the middle of the handshake. Most likely --server-key is not its public "
+                      "key."
                     : "it hung up in the middle of the handshake.";
     };
     return fmt::format("The client at {} refuses this server: {}", where, why());

@@ -126,10 +126,10 @@ void ServerSession::lose_link(std::string_view why) {
 
 void ServerSession::step() {
     const TimeNs now = monotonic_now();
-    const Readable ready = wait_readable(
-        {wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(), link_->input.pollable(),
-         link_->watch.pollable()},
-        next_timer(now) - now);
+    const Readable ready =
+        wait_readable({wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(),
+                       link_->input.pollable(), link_->watch.pollable()},
+                      next_timer(now) - now);
     if (ready[0]) wake_.clear();
     if (ready[1]) receive(link_->monitor, Channel::monitor);
     if (ready[2]) receive(link_->frames, Channel::frames);

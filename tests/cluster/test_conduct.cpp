@@ -42,7 +42,8 @@ TEST_CASE("points add up and halve every half-life") {
     CHECK(conduct.points("b", k_start) == 0);
 }
 
-TEST_CASE("now and then is forgiven for ever, often is a ban: the limit is where points balance their decay") {
+TEST_CASE(
+    "now and then is forgiven for ever, often is a ban: the limit is where points balance their decay") {
     // One point every T: the sum tends to 1 / (1 - 2^(-T/half_life)), which is below 10 for T > 0.152 half_life.
     const TimeNs half_life = ConductParams{}.half_life;
     for (const bool often : {false, true}) {
@@ -63,7 +64,8 @@ TEST_CASE("a ban comes at the tenth point, has an end, and is told once") {
     REQUIRE(ban);
     CHECK(ban->until == k_start + 30 * k_second_ns);
     CHECK(ban->times == 1);
-    CHECK(ban_sentence(*ban, k_start + 1) == "It misbehaved too often (last: misplaced) and may come back in 30 s.");
+    CHECK(ban_sentence(*ban, k_start + 1) ==
+          "It misbehaved too often (last: misplaced) and may come back in 30 s.");
     CHECK_FALSE(conduct.report("a", Offence::corrupt, k_start + k_second_ns));  // Not heard, so nothing more.
     CHECK(conduct.ban_of("a", ban->until - 1));
     CHECK_FALSE(conduct.ban_of("a", ban->until));
@@ -101,12 +103,14 @@ TEST_CASE("memory is bounded, and newcomers do not wash away bans") {
     Conduct conduct;
     offend_until_banned(conduct, "banned", k_start);
     conduct.report("offender", Offence::corrupt, k_start);
-    for (int i = 0; i < 10'000; ++i) conduct.report(fmt::format("new {}", i), Offence::unknown_type, k_start + i);
+    for (int i = 0; i < 10'000; ++i)
+        conduct.report(fmt::format("new {}", i), Offence::unknown_type, k_start + i);
     CHECK(conduct.remembered() == Conduct::k_max_peers);
     CHECK(conduct.ban_of("banned", k_start + k_second_ns));
     CHECK(conduct.points("offender", k_start) > 0);
     // When all are banned, the ban that ends first goes, and the newest offender is still judged.
-    for (int i = 0; i < 9'000; ++i) offend_until_banned(conduct, fmt::format("bad {}", i), k_start + 2 * k_second_ns);
+    for (int i = 0; i < 9'000; ++i)
+        offend_until_banned(conduct, fmt::format("bad {}", i), k_start + 2 * k_second_ns);
     CHECK(conduct.remembered() == Conduct::k_max_peers);
 }
 

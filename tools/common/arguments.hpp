@@ -86,7 +86,8 @@ inline std::optional<MeshCache> mesh_cache_of(const std::string& word,
 
 /// --keygen FILE: ends the parsing wherever it stands, as --help does.
 struct KeygenRequest : CLI::Success {
-    explicit KeygenRequest(std::string name) : CLI::Success("keygen", CLI::ExitCodes::Success), path(std::move(name)) {}
+    explicit KeygenRequest(std::string name)
+        : CLI::Success("keygen", CLI::ExitCodes::Success), path(std::move(name)) {}
     std::filesystem::path path;
 };
 inline CLI::Option* add_keygen(CLI::App& app) {

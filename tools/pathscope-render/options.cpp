@@ -127,9 +127,11 @@ struct KeyOptions {
 };
 
 void add_key_options(CLI::App& app, RenderOptions& options, KeyOptions& keys) {
-    const auto key = app.add_option("--key", keys.key, "this client's secret key, as --keygen writes it; servers need keys then")
+    const auto key = app.add_option("--key", keys.key,
+                                    "this client's secret key, as --keygen writes it; servers need keys then")
                          ->type_name("FILE");
-    app.add_option("--allow", keys.allow, "public keys of the servers that may come in, one a line; read again when it changes")
+    app.add_option("--allow", keys.allow,
+                   "public keys of the servers that may come in, one a line; read again when it changes")
         ->needs(key)
         ->type_name("FILE");
     app.add_flag("--insecure", options.client.insecure,
@@ -142,7 +144,8 @@ Result<void> check_keys(RenderOptions& options, const KeyOptions& keys) {
     ClientConfig& client = options.client;
     if (!keys.key.empty()) {
         if (client.listens && keys.allow.empty())
-            return bad_input("--listen with --key needs --allow FILE: the public keys of the servers that may come in.");
+            return bad_input(
+                "--listen with --key needs --allow FILE: the public keys of the servers that may come in.");
         const auto pair = read_secret_key_file(keys.key);
         if (!pair) return pair.error();
         client.keys = ClientKeys{*pair, keys.allow};

@@ -45,9 +45,11 @@ int main(int argc, char** argv) {
     app.add_option("--cache", config.cache_folder, "folder for scene files, by content; safe to delete")
         ->type_name("DIR");
     add_mesh_cache(app, mesh_cache);
-    const auto key = app.add_option("--key", key_file, "this server's secret key, as --keygen writes it")->type_name("FILE");
+    const auto key = app.add_option("--key", key_file, "this server's secret key, as --keygen writes it")
+                         ->type_name("FILE");
     const auto of_client =
-        app.add_option("--server-key", client_key, "the client's public key, or its .pub file")->type_name("KEY");
+        app.add_option("--server-key", client_key, "the client's public key, or its .pub file")
+            ->type_name("KEY");
     key->needs(of_client);
     of_client->needs(key);
     add_keygen(app);

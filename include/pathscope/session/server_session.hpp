@@ -38,8 +38,8 @@ struct ServerConfig {
     std::string host = "127.0.0.1";  ///< Of the client.
     std::array<int, 3> ports = k_default_ports;
     Security security;  ///< A Dialler, or none.
-    std::string name;  ///< For people; empty = host name and process id.
-    int threads = 0;   ///< 0 = all cores.
+    std::string name;   ///< For people; empty = host name and process id.
+    int threads = 0;    ///< 0 = all cores.
     TreeKind tree = TreeKind::wide;
     double samples_per_second = 0;  ///< Speed cap; 0 = none.
     std::filesystem::path cache_folder;
