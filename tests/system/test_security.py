@@ -201,7 +201,7 @@ class Security(unittest.TestCase):
         self.assertIsNone(client.process.poll(), client.text())
         self.allow.write_text((self.folder / "good.pub").read_text())
         begin = time.monotonic()
-        self.assertTrue(client.says("other is lost Its key was taken off the list."), client.text())
+        self.assertTrue(client.says("other is lost: Its key was taken off the list."), client.text())
         self.assertLess(time.monotonic() - begin, 5)
         self.assertTrue(revoked.says("does not know this server's key"), revoked.text())
         stats = self.finish(client)
