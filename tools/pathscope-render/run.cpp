@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include "pathscope/core/files.hpp"
@@ -128,12 +129,14 @@ ClientConfig complete_config(const RenderOptions& options) {
     return config;
 }
 
-Result<void> render(ClientSession& session, const std::atomic<bool>& interrupted) {
+Result<void> render(ClientSession& session, const std::optional<ClientKeys>& keys,
+                    const std::atomic<bool>& interrupted) {
     ProgressLine line;
     const auto& endpoints = session.endpoints();
     if (session.progress().waiting)
-        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST",
-                             endpoints[1]));
+        log_note(fmt::format(
+            "Waiting for servers at {}; start them with: pathscope-server --connect HOST{}", endpoints[1],
+            keys ? fmt::format(" --key FILE --server-key '{}'", keys->pair.public_key) : ""));
     while (!session.complete()) {
         session.step(k_longest_step);
         line.show(session.progress());
@@ -164,7 +167,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     auto session = ClientSession::create(complete_config(options),
                                          {*state, shared_scene, SceneDepot(*opened->files)}, store);
     if (!session) return session.error();
-    if (const auto done = render(**session, interrupted); !done) return done;
+    if (const auto done = render(**session, options.client.keys, interrupted); !done) return done;
     const TimeNs rendered = monotonic_now();
 
     // The picture, and what was asked for beside it.
