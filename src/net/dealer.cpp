@@ -16,19 +16,37 @@ std::string random_routing_id() {
     return id;
 }
 
-Result<DealerSocket> DealerSocket::connect(const Context& context, const std::string& endpoint,
-                                           const std::string& routing_id, const SocketOptions& options) {
+Result<DealerSocket> DealerSocket::open(const Context& context, const std::string& routing_id,
+                                        const SocketOptions& options) {
     CHECK(!routing_id.empty() && routing_id.size() <= 255 && routing_id[0] != 0, routing_id.size());
     auto socket = open_socket(context, ZMQ_DEALER, options);
     if (!socket) return socket.error();
     set_option(socket->get(), ZMQ_ROUTING_ID, routing_id);
     set_option(socket->get(), ZMQ_IMMEDIATE, 1);
-    const auto connected = connect_socket(socket->get(), endpoint);
-    if (!connected) return connected.error();
-
     DealerSocket dealer;
     dealer.socket_ = std::move(*socket);
     return dealer;
+}
+
+Result<DealerSocket> DealerSocket::connect(const Context& context, const std::string& endpoint,
+                                           const std::string& routing_id, const SocketOptions& options) {
+    auto dealer = open(context, routing_id, options);
+    if (!dealer) return dealer.error();
+    const auto connected = connect_socket(dealer->socket_.get(), endpoint);
+    if (!connected) return connected.error();
+    return dealer;
+}
+
+Result<WatchedDealer> DealerSocket::connect_watched(const Context& context, const std::string& endpoint,
+                                                    const std::string& routing_id,
+                                                    const SocketOptions& options) {
+    auto dealer = open(context, routing_id, options);
+    if (!dealer) return dealer.error();
+    auto watch = ConnectionWatch::watch(context, *dealer);
+    if (!watch) return watch.error();
+    const auto connected = connect_socket(dealer->socket_.get(), endpoint);
+    if (!connected) return connected.error();
+    return WatchedDealer{std::move(*dealer), std::move(*watch)};
 }
 
 SendOutcome DealerSocket::send(Frames&& frames) {

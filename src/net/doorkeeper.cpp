@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <utility>
 
 #include "pathscope/core/check.hpp"
 #include "pathscope/net/poller.hpp"
@@ -13,6 +14,7 @@ namespace {
 
 const char* const k_zap_address = "inproc://zeromq.zap.01";  // Fixed by RFC 27.
 constexpr std::size_t k_key_bytes = 32;
+constexpr std::size_t k_max_refused = 1000;  ///< Kept until they are taken; more are refused all the same.
 
 std::string to_z85(const std::string& key) {
     char text[5 * k_key_bytes / 4 + 1];
@@ -49,6 +51,16 @@ void Doorkeeper::admit_only(const std::vector<std::string>& public_keys) {
     admitted_ = {public_keys.begin(), public_keys.end()};
 }
 
+bool Doorkeeper::admits(const std::string& public_key) const {
+    const std::scoped_lock lock(mutex_);
+    return admitted_.contains(public_key);
+}
+
+std::vector<RefusedKey> Doorkeeper::take_refused() {
+    const std::scoped_lock lock(mutex_);
+    return std::exchange(refused_, {});
+}
+
 void Doorkeeper::serve() {
     while (!wait_readable({stop_.pollable(), Pollable{socket_}}, -1)[0]) {
         while (const auto request = receive_frames(socket_)) {
@@ -67,6 +79,7 @@ Frames Doorkeeper::answer(const Frames& request) {
         const std::string key = to_z85(request[8]);
         const std::scoped_lock lock(mutex_);
         if (admitted_.contains(key)) return {"", version, id, "200", "OK", key, ""};
+        if (refused_.size() < k_max_refused) refused_.push_back({key, request[5]});
     }
     return {"", version, id, "400", "this key is not on the list", "", ""};
 }

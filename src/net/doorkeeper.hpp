@@ -10,6 +10,7 @@
 
 #include "pathscope/core/frames.hpp"
 #include "pathscope/core/result.hpp"
+#include "pathscope/net/security.hpp"
 #include "pathscope/net/wake_pair.hpp"
 
 namespace pathscope {
@@ -21,6 +22,8 @@ class Doorkeeper {
     ~Doorkeeper();
 
     void admit_only(const std::vector<std::string>& public_keys);
+    [[nodiscard]] bool admits(const std::string& public_key) const;
+    [[nodiscard]] std::vector<RefusedKey> take_refused();
 
   private:
     Doorkeeper(void* socket, WakePair stop);
@@ -29,8 +32,9 @@ class Doorkeeper {
 
     void* const socket_;
     WakePair stop_;
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::set<std::string> admitted_;
+    std::vector<RefusedKey> refused_;
     std::thread thread_;
 };
 

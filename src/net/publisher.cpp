@@ -1,9 +1,15 @@
 #include "pathscope/net/publisher.hpp"
 
+#include "context_state.hpp"
 #include "pathscope/core/check.hpp"
 #include "zmq_call.hpp"
 
 namespace pathscope {
+namespace {
+
+constexpr std::size_t k_max_subscribers = 8192;
+
+}  // namespace
 
 Result<PublisherSocket> PublisherSocket::bind(const Context& context, const std::string& endpoint,
                                               const SocketOptions& options) {
@@ -15,6 +21,7 @@ Result<PublisherSocket> PublisherSocket::bind(const Context& context, const std:
 
     PublisherSocket publisher;
     publisher.endpoint_ = bound_endpoint(socket->get());
+    publisher.has_keys_ = std::holds_alternative<Listener>(options.security);
     publisher.socket_ = std::move(*socket);
     return publisher;
 }
@@ -26,13 +33,33 @@ void PublisherSocket::publish(Frames&& frames) {
 
 int PublisherSocket::count_subscriptions() {
     for (int i = 0; i < 1000; ++i) {
-        const auto frames = receive_frames(socket_.get());
+        Origin origin;
+        const auto frames = receive_frames(socket_.get(), &origin);
         if (!frames) break;
         // ZeroMQ RFC 29: a byte, 1 to subscribe and 0 to unsubscribe, then the topic.
-        if (frames->front().starts_with('\1')) ++subscriptions_;
+        if (frames->front().starts_with('\1')) {
+            ++subscriptions_;
+            if (has_keys_) remember({origin.key, origin.address, origin.descriptor});
+        }
         if (frames->front().starts_with('\0') && subscriptions_ > 0) --subscriptions_;
     }
     return subscriptions_;
+}
+
+void PublisherSocket::remember(Subscriber subscriber) {
+    std::erase(subscribers_, subscriber);
+    if (subscribers_.size() >= k_max_subscribers) subscribers_.pop_front();
+    subscribers_.push_back(std::move(subscriber));
+}
+
+void PublisherSocket::disconnect_unlisted() {
+    if (!has_keys_) return;
+    count_subscriptions();
+    std::erase_if(subscribers_, [this](const Subscriber& subscriber) {
+        if (socket_.context().doorkeeper->admits(subscriber.key)) return false;
+        disconnect({subscriber.key, subscriber.address, subscriber.descriptor}, endpoint_);
+        return true;
+    });
 }
 
 }  // namespace pathscope

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 #include <zmq.h>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
+#include <cctype>
 #include <cerrno>
 #include <cstdint>
 
@@ -18,7 +22,9 @@ constexpr std::size_t k_key_characters = 40, k_key_bytes = 32;
 
 KeyPair make_key_pair() {
     char public_key[k_key_characters + 1], secret_key[k_key_characters + 1];
-    CHECK(zmq_curve_keypair(public_key, secret_key) == 0, zmq_strerror(errno));
+    do {
+        CHECK(zmq_curve_keypair(public_key, secret_key) == 0, zmq_strerror(errno));
+    } while (std::isalnum(static_cast<unsigned char>(public_key[0])) == 0);
     return {public_key, secret_key};
 }
 
@@ -54,11 +60,22 @@ Result<void> admit_only(const Context& context, const std::vector<std::string>& 
     return {};
 }
 
+std::vector<RefusedKey> take_refused_keys(const Context& context) {
+    const std::unique_ptr<Doorkeeper>& doorkeeper = context.state()->doorkeeper;
+    return doorkeeper ? doorkeeper->take_refused() : std::vector<RefusedKey>();
+}
+
 bool reaches_other_machines(std::string_view endpoint) {
     if (!endpoint.starts_with("tcp://")) return false;
     const std::string_view address = endpoint.substr(6);
-    const std::string_view host = address.substr(0, address.rfind(':'));
-    return !(host.starts_with("127.") || host == "localhost");
+    std::string host(address.substr(0, address.rfind(':')));
+    if (host == "localhost") return false;
+    // By its number: the name of an interface or of a host may begin with "127." as well.
+    in_addr number{};
+    if (::inet_pton(AF_INET, host.c_str(), &number) == 1) return (ntohl(number.s_addr) >> 24) != 127;
+    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+    in6_addr wide{};
+    return ::inet_pton(AF_INET6, host.c_str(), &wide) != 1 || !IN6_IS_ADDR_LOOPBACK(&wide);
 }
 
 }  // namespace pathscope

@@ -4,19 +4,10 @@
 
 namespace pathscope {
 
-SocketHandle::SocketHandle(SocketHandle&& other) noexcept
-    : context_(std::move(other.context_)), socket_(std::exchange(other.socket_, nullptr)) {}
-
-SocketHandle& SocketHandle::operator=(SocketHandle&& other) noexcept {
-    // The old socket must close before the context that it may have been the last to hold.
-    SocketHandle old(std::move(*this));
-    context_ = std::move(other.context_);
-    socket_ = std::exchange(other.socket_, nullptr);
-    return *this;
-}
-
-SocketHandle::~SocketHandle() {
-    if (socket_) zmq_close(socket_);
+OpenSocket::~OpenSocket() {
+    // A monitor that nobody reads any more would block ZeroMQ's own thread with its next event.
+    zmq_socket_monitor(socket, nullptr, 0);
+    zmq_close(socket);
 }
 
 }  // namespace pathscope

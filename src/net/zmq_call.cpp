@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <netdb.h>
+#include <sys/socket.h>
+
 #include <cerrno>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 
@@ -69,6 +73,13 @@ class IncomingFrame {
         }
     }
     bool more() { return zmq_msg_more(&message_) != 0; }
+    Origin origin() {
+        const auto text = [&](const char* property) {
+            const char* value = zmq_msg_gets(&message_, property);
+            return std::string(value ? value : "");
+        };
+        return {text("User-Id"), text("Peer-Address"), zmq_msg_get(&message_, ZMQ_SRCFD)};
+    }
     std::string bytes() {
         return {static_cast<const char*>(zmq_msg_data(&message_)), zmq_msg_size(&message_)};
     }
@@ -147,6 +158,7 @@ Result<SocketHandle> open_socket(const Context& context, int type, const SocketO
     set_option(socket, ZMQ_RECONNECT_IVL, options.reconnect_ms);
     set_option(socket, ZMQ_RECONNECT_IVL_MAX, options.reconnect_max_ms);
     set_option(socket, ZMQ_BACKLOG, options.backlog);
+    set_option(socket, ZMQ_HANDSHAKE_IVL, options.handshake_ms);
     set_option(socket, ZMQ_TCP_KEEPALIVE, 1);
     set_option(socket, ZMQ_HEARTBEAT_IVL, options.transport_heartbeat_ms);
     set_option(socket, ZMQ_HEARTBEAT_TIMEOUT, 6 * options.transport_heartbeat_ms);
@@ -190,15 +202,46 @@ int send_frames(void* socket, const std::string* leading, Frames& frames) {
     return 0;
 }
 
-std::optional<Frames> receive_frames(void* socket) {
+std::optional<Frames> receive_frames(void* socket, Origin* origin) {
     IncomingFrame incoming;
     if (!incoming.receive(socket)) return std::nullopt;
     Frames frames;
     frames.push_back(incoming.bytes());
+    if (origin) *origin = incoming.origin();
     // The rest of a message has arrived with its first frame.
-    while (incoming.more() && incoming.receive(socket))
+    while (incoming.more() && incoming.receive(socket)) {
         if (frames.size() < k_max_frames) frames.push_back(incoming.bytes());
+        // The routing id before a message is made here, and does not always know where the message came from.
+        if (origin && origin->descriptor < 0) *origin = incoming.origin();
+    }
     return frames;
+}
+
+namespace {
+
+/// Host and port of one end of a TCP connection: getpeername or getsockname.
+using AskEnd = int (*)(int, sockaddr*, socklen_t*);
+std::pair<std::string, int> end_of(int descriptor, AskEnd ask) {
+    sockaddr_storage address{};
+    socklen_t size = sizeof address;
+    if (ask(descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+    char host[NI_MAXHOST], port[NI_MAXSERV];
+    if (::getnameinfo(reinterpret_cast<sockaddr*>(&address), size, host, sizeof host, port, sizeof port,
+                      NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+        return {};
+    return {host, std::atoi(port)};
+}
+
+}  // namespace
+
+std::string peer_of(int descriptor) { return end_of(descriptor, ::getpeername).first; }
+
+void disconnect(const Origin& origin, const std::string& endpoint) {
+    if (origin.descriptor < 0 || !endpoint.starts_with("tcp://")) return;
+    const int port = std::atoi(endpoint.substr(endpoint.rfind(':') + 1).c_str());
+    if (peer_of(origin.descriptor) != origin.address) return;
+    if (end_of(origin.descriptor, ::getsockname).second != port) return;
+    ::shutdown(origin.descriptor, SHUT_RDWR);
 }
 
 }  // namespace pathscope

@@ -32,8 +32,23 @@ void set_option(void* socket, int option, std::string_view value);
 /// nothing was sent and nothing taken. The leading frame (an address) may be null.
 [[nodiscard]] int send_frames(void* socket, const std::string* leading, Frames& frames);
 
+/// Where a message came from, as ZeroMQ tells it.
+struct Origin {
+    std::string key;      ///< The public key that it entered with; empty without keys.
+    std::string address;  ///< Of the machine, as a number; empty if unknown.
+    int descriptor = -1;  ///< Of the connection that it came by, which may be closed by now.
+};
+
 /// The next message that is waiting; of one with more than k_max_frames, only the first ones are kept.
-[[nodiscard]] std::optional<Frames> receive_frames(void* socket);
+[[nodiscard]] std::optional<Frames> receive_frames(void* socket, Origin* origin = nullptr);
+
+/// Ends the connection that a message came by; ZeroMQ itself has no way to show a peer of a listening socket out. It
+/// keeps no promise that a descriptor is still what it was, so nothing is done unless it leads from that address to our
+/// endpoint. At worst another connection between the two is ended, and made anew.
+void disconnect(const Origin& origin, const std::string& endpoint);
+
+/// The numeric address of a connection's other end; empty if it is closed.
+[[nodiscard]] std::string peer_of(int descriptor);
 
 inline constexpr std::size_t k_max_frames = 16;  ///< More than any message of ours or of ZeroMQ's has.
 

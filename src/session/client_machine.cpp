@@ -209,6 +209,11 @@ void ClientMachine::on_process_ended(std::uint32_t pid, std::string_view name, s
     }
 }
 
+void ClientMachine::on_revoked(const std::string& instance, std::string_view why, TimeNs now) {
+    now_ = now;
+    lose(instance, PeerCause::lost, why);
+}
+
 void ClientMachine::say_goodbye(TimeNs now) {
     now_ = now;
     for (const auto& [instance, server] : servers_) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "channel_options.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
@@ -43,6 +42,7 @@ Result<std::unique_ptr<ClientSession>> ClientSession::create(const ClientConfig&
 
 ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventStore& store, WakePair wake)
     : config_(config),
+      store_(store),
       wake_(std::move(wake)),
       runner_(wake_, config.threads),
       machine_(config, std::move(job), random_session(), store, *this, monotonic_now()),
@@ -55,19 +55,16 @@ Result<void> ClientSession::open_sockets() {
         return any_port ? fmt::format("tcp://{}:*", config_.host)
                         : fmt::format("tcp://{}:{}", config_.host, config_.ports[channel]);
     };
+    Result<Door> door = Door::open(context_, config_);
+    if (!door) return door.error();
     const auto open = [&](bool any_port) -> Result<Sockets> {
-        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), channel_options(Channel::input));
+        auto input = PublisherSocket::bind(context_, endpoint(0, any_port), door->options(Channel::input));
         if (!input) return input.error();
-        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), channel_options(Channel::monitor));
+        auto monitor = RouterSocket::bind(context_, endpoint(1, any_port), door->options(Channel::monitor));
         if (!monitor) return monitor.error();
-        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), channel_options(Channel::frames));
+        auto frames = RouterSocket::bind(context_, endpoint(2, any_port), door->options(Channel::frames));
         if (!frames) return frames.error();
-        auto watch_monitor = ConnectionWatch::watch(context_, *monitor);
-        if (!watch_monitor) return watch_monitor.error();
-        auto watch_frames = ConnectionWatch::watch(context_, *frames);
-        if (!watch_frames) return watch_frames.error();
-        return Sockets{std::move(*input), std::move(*monitor), std::move(*frames), std::move(*watch_monitor),
-                       std::move(*watch_frames)};
+        return Sockets{std::move(*input), std::move(*monitor), std::move(*frames)};
     };
 
     Result<Sockets> sockets = open(config_.any_ports);
@@ -76,6 +73,9 @@ Result<void> ClientSession::open_sockets() {
     if (moved) sockets = open(true);
     if (!sockets) return sockets.error();
     sockets_ = std::move(*sockets);
+    door_ = std::move(*door);
+    const auto watched = door_->watch(sockets_->input, sockets_->monitor, sockets_->frames);
+    if (!watched) return watched.error();
     endpoints_ = {sockets_->input.endpoint(), sockets_->monitor.endpoint(), sockets_->frames.endpoint()};
     for (std::size_t i = 0; i < endpoints_.size(); ++i)
         config_.ports[i] = std::stoi(endpoints_[i].substr(endpoints_[i].rfind(':') + 1));
@@ -97,6 +97,8 @@ Result<void> ClientSession::start_local_servers() {
             "--quiet"};
         if (!config_.local_server_mesh_cache.empty())
             arguments.insert(arguments.end(), {"--mesh-cache", config_.local_server_mesh_cache});
+        for (std::string& argument : door_->arguments_of_local_server(i))
+            arguments.push_back(std::move(argument));
         auto process = ChildProcess::start(config_.server_program, arguments);
         if (!process) return process.error();
         machine_.expect_server(std::uint32_t(process->pid()), name);
@@ -110,10 +112,11 @@ void ClientSession::step(TimeNs max_wait) {
     TimeNs next = machine_.next_timer(now);
     if (!local_servers_.empty()) next = std::min(next, now + k_child_watch);
     std::vector<Pollable> pollables{wake_.pollable()};
-    if (sockets_)
+    if (sockets_) {
         pollables.insert(pollables.end(), {sockets_->monitor.pollable(), sockets_->frames.pollable(),
-                                           sockets_->input.pollable(), sockets_->watch_monitor.pollable(),
-                                           sockets_->watch_frames.pollable()});
+                                           sockets_->input.pollable()});
+        for (const Pollable& connections : door_->pollables()) pollables.push_back(connections);
+    }
     const Readable ready = wait_readable(pollables, std::clamp<TimeNs>(next - now, 0, max_wait));
     now = monotonic_now();
     if (now - last_step_ > k_own_pause + max_wait) machine_.on_own_pause(now - last_step_);
@@ -123,9 +126,8 @@ void ClientSession::step(TimeNs max_wait) {
     if (ready[1]) receive(sockets_->monitor, Channel::monitor);
     if (ready[2]) receive(sockets_->frames, Channel::frames);
     if (ready[3]) sockets_->input.count_subscriptions();
-    if (ready[4]) watch(sockets_->watch_monitor);
-    if (ready[5]) watch(sockets_->watch_frames);
     for (RoundOutcome& outcome : runner_.take_finished()) machine_.on_outcome(outcome, monotonic_now());
+    watch_door();
     watch_local_servers();
     machine_.on_timers(monotonic_now());
 }
@@ -136,8 +138,16 @@ void ClientSession::receive(RouterSocket& socket, Channel channel) {
     });
 }
 
-void ClientSession::watch(ConnectionWatch& connections) {
-    if (connections.take_changes().lost > 0) machine_.on_connection_lost(monotonic_now());
+/// Who was turned away is counted; who hung up is looked for; who was taken off the list is given up at once.
+void ClientSession::watch_door() {
+    if (!door_) return;
+    const TimeNs now = monotonic_now();
+    const Door::News news = door_->step(now, sockets_->input);
+    if (news.refused > 0) store_.count(Counter::refused_peers, news.refused);
+    if (news.lost > 0) machine_.on_connection_lost(now);
+    for (RouterSocket* socket : {&sockets_->monitor, &sockets_->frames})
+        for (const std::string& instance : socket->take_revoked())
+            machine_.on_revoked(instance, "Its key was taken off the list.", now);
 }
 
 void ClientSession::watch_local_servers() {

@@ -27,12 +27,18 @@ void ServerMachine::on_linked(std::string instance, TimeNs now) {
 }
 
 void ServerMachine::relink(std::string why) {
-    if (relink_reason_.empty()) relink_reason_ = std::move(why);
+    if (!relink_reason_) relink_reason_ = std::move(why);
+}
+
+void ServerMachine::on_refused(TimeNs now) {
+    now_ = now;
+    relink_reason_ = "";
 }
 
 /// Forgets everything about this client but the scene, which the next one may want as well.
 void ServerMachine::lose_link() {
-    log_note(fmt::format("{}: {} Dialling {} again.", identity_.name, relink_reason_, identity_.client));
+    if (!relink_reason_->empty())
+        log_note(fmt::format("{}: {} Dialling {} again.", identity_.name, *relink_reason_, identity_.client));
     world_.cancel_all();
     leases_.clear();
     unsent_answers_.clear();
@@ -41,7 +47,7 @@ void ServerMachine::lose_link() {
     missed_since_.reset();
     snapshot_asked_.reset();
     session_ = 0;
-    relink_reason_.clear();
+    relink_reason_.reset();
     linked_ = false;
 }
 
@@ -55,7 +61,7 @@ void ServerMachine::end(std::optional<Error> refusal) {
 void ServerMachine::on_timers(TimeNs now) {
     now_ = now;
     if (ended_ || !linked_) return;
-    if (!relink_reason_.empty()) return lose_link();
+    if (relink_reason_) return lose_link();
     if (phase_ == Phase::hello) {
         if (now_ < next_hello_) return;
         send_monitor(message::Hello{instance_, identity_.name, identity_.version, identity_.build,
@@ -87,7 +93,7 @@ void ServerMachine::beat() {
 TimeNs ServerMachine::next_timer(TimeNs now) const {
     TimeNs next = now + k_idle_wait;
     if (!linked_) return next;
-    if (!relink_reason_.empty()) return now;
+    if (relink_reason_) return now;
     if (phase_ == Phase::hello) {
         next = std::min(next, next_hello_);
     } else {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "channel_options.hpp"
+#include "pathscope/core/log.hpp"
 #include "pathscope/core/parallel_for.hpp"
 #include "pathscope/net/poller.hpp"
 #include "pathscope/session/build_identity.hpp"
@@ -60,8 +61,14 @@ void ServerSession::request_stop() noexcept {
 
 Result<void> ServerSession::run() {
     while (!machine_.ended() && !stop_requested_.load()) {
-        if (!machine_.linked())
+        if (!machine_.linked()) {
+            link_.reset();
+            if (monotonic_now() < redial_.next()) {
+                wait_to_dial();
+                continue;
+            }
             if (const auto dialled = dial(); !dialled) return dialled;
+        }
         step();
     }
     if (machine_.refusal()) return *machine_.refusal();
@@ -69,36 +76,54 @@ Result<void> ServerSession::run() {
     return {};
 }
 
+/// After a refusal. Results that come meanwhile belong to a client that is gone; step() clears them away.
+void ServerSession::wait_to_dial() {
+    if (wait_readable({wake_.pollable()}, redial_.next() - monotonic_now())[0]) wake_.clear();
+}
+
 Result<void> ServerSession::dial() {
-    link_.reset();
     const std::string instance = random_routing_id();
     // Input first: what is published after WELCOME was made must not be missed if it can be helped.
     auto input = SubscriberSocket::connect(context_, endpoint(config_, 0), std::string(k_input_topic),
-                                           channel_options(Channel::input));
+                                           channel_options(Channel::input, config_.security));
     if (!input) return input.error();
-    auto monitor =
-        DealerSocket::connect(context_, endpoint(config_, 1), instance, channel_options(Channel::monitor));
+    auto monitor = DealerSocket::connect_watched(context_, endpoint(config_, 1), instance,
+                                                 channel_options(Channel::monitor, config_.security));
     if (!monitor) return monitor.error();
-    auto frames =
-        DealerSocket::connect(context_, endpoint(config_, 2), instance, channel_options(Channel::frames));
+    auto frames = DealerSocket::connect(context_, endpoint(config_, 2), instance,
+                                        channel_options(Channel::frames, config_.security));
     if (!frames) return frames.error();
-    link_.emplace(Link{std::move(*input), std::move(*monitor), std::move(*frames)});
+    link_.emplace(
+        Link{std::move(*input), std::move(monitor->dealer), std::move(monitor->watch), std::move(*frames)});
     machine_.on_linked(instance, monotonic_now());
     return {};
 }
 
 void ServerSession::step() {
     const TimeNs now = monotonic_now();
-    const Readable ready = wait_readable(
-        {wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(), link_->input.pollable()},
-        machine_.next_timer(now) - now);
+    const Readable ready =
+        wait_readable({wake_.pollable(), link_->monitor.pollable(), link_->frames.pollable(),
+                       link_->input.pollable(), link_->watch.pollable()},
+                      machine_.next_timer(now) - now);
     if (ready[0]) wake_.clear();
     if (ready[1]) receive(link_->monitor, Channel::monitor);
     if (ready[2]) receive(link_->frames, Channel::frames);
     if (ready[3]) receive(link_->input, Channel::input);
+    if (ready[4]) on_connection_changes();
+    if (machine_.welcomed()) redial_.on_welcome();
     for (LoadedScene& loaded : loaded_.take_all()) machine_.on_loaded(loaded, monotonic_now());
     for (RoundOutcome& outcome : runner_.take_finished()) machine_.on_outcome(outcome, monotonic_now());
     machine_.on_timers(monotonic_now());
+}
+
+/// Refused at the door: it says so, and dials anew after a pause, as ZeroMQ does not.
+void ServerSession::on_connection_changes() {
+    for (const Refusal& refusal : link_->watch.take_changes().refusals) {
+        const auto sentence =
+            redial_.on_refused(refusal.reason, endpoint(config_, 1), config_.security, monotonic_now());
+        if (sentence) log_warning(fmt::format("{}: {}", config_.name, *sentence));
+        machine_.on_refused(monotonic_now());
+    }
 }
 
 template <class Socket>

@@ -24,7 +24,8 @@ void send_garbage(const std::string& endpoint, const std::string& bytes) {
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     REQUIRE(::connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
-    REQUIRE(::send(line, bytes.data(), bytes.size(), MSG_NOSIGNAL) == ssize_t(bytes.size()));
+    if (!bytes.empty())
+        REQUIRE(::send(line, bytes.data(), bytes.size(), MSG_NOSIGNAL) == ssize_t(bytes.size()));
     ::close(line);
 }
 
@@ -41,7 +42,7 @@ TEST_CASE("connections are counted as they come and go, and the lost one is then
         const ConnectionChanges changes = watch->take_changes();
         seen.accepted += changes.accepted;
         seen.lost += changes.lost;
-        seen.refused += changes.refused;
+        seen.refusals.insert(seen.refusals.end(), changes.refusals.begin(), changes.refusals.end());
     };
 
     auto stays = DealerSocket::connect(context, router->endpoint(), "stays");
@@ -57,7 +58,57 @@ TEST_CASE("connections are counted as they come and go, and the lost one is then
     CHECK(soon(*watch, [&] { return take(), seen.lost == 1; }));
     CHECK(soon(*router, [&] { return router->send("goes", {"?"}) == SendOutcome::unreachable; }));
     CHECK(router->send("stays", {"?"}) == SendOutcome::delivered);
-    CHECK(seen == ConnectionChanges{2, 1, 0});
+    CHECK(seen == ConnectionChanges{2, 1, {}});
+}
+
+TEST_CASE("who connects and says nothing of ours is counted as refused") {
+    const Context context;
+    const KeyPair keys = make_key_pair();
+    REQUIRE(bool(admit_only(context, {keys.public_key})));
+    SocketOptions with_keys, quick;
+    with_keys.security = Listener{keys};
+    quick.handshake_ms = 100;
+    struct Case {
+        SocketOptions options;
+        const char* bytes;
+        RefusalReason reason;
+    };
+    for (const Case& c :
+         {Case{with_keys, "GET / HTTP/1.1\r\nHost: a\r\n\r\n", RefusalReason::no_zeromq},
+          Case{with_keys, "", RefusalReason::broke_off}, Case{quick, "", RefusalReason::broke_off}}) {
+        auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*", c.options);
+        auto watch = ConnectionWatch::watch(context, *router);
+        send_garbage(router->endpoint(), c.bytes);
+        std::vector<Refusal> seen;
+        CHECK(soon(*watch, [&] {
+            for (Refusal& refusal : watch->take_changes().refusals) seen.push_back(std::move(refusal));
+            return !seen.empty();
+        }));
+        REQUIRE(seen.size() == 1);
+        CHECK(seen[0].reason == c.reason);
+    }
+}
+
+TEST_CASE("a watch and its socket may end in either order, whatever still happens") {
+    const Context context;
+    for (const bool watch_first : {true, false}) {
+        auto router = RouterSocket::bind(context, "tcp://127.0.0.1:*");
+        std::optional<ConnectionWatch> watch(std::move(*ConnectionWatch::watch(context, *router)));
+        auto dealer = DealerSocket::connect(context, router->endpoint(), "d");
+        REQUIRE(testing::send_once_connected(*dealer, {"x"}) == SendOutcome::delivered);
+        if (watch_first) watch.reset();
+        std::optional<RouterSocket> owner(std::move(*router));
+        if (!watch_first) owner.reset();
+        // ZeroMQ's own thread still runs: others can connect.
+        auto other = RouterSocket::bind(context, "tcp://127.0.0.1:*");
+        auto caller = DealerSocket::connect(context, other->endpoint(), "c");
+        REQUIRE(testing::send_once_connected(*caller, {"y"}) == SendOutcome::delivered);
+        CHECK(testing::receive_soon(*other)->frames == Frames{"y"});
+    }
+}
+
+TEST_CASE("reasons have names") {
+    for (const auto& [reason, name] : k_refusal_reason_names) CHECK(from_name<RefusalReason>(name) == reason);
 }
 
 TEST_CASE("peers that speak no ZeroMQ harm nobody") {

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "pathscope/core/enum_names.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/block.hpp"
+#include "pathscope/net/key_file.hpp"
 #include "pathscope/scene/mesh_cache.hpp"
 #include "pathscope/session/build_identity.hpp"
 
@@ -82,7 +84,22 @@ inline std::optional<MeshCache> mesh_cache_of(const std::string& word,
     return MeshCache(word.empty() ? cache_folder / "meshes" : std::filesystem::path(word));
 }
 
-/// Parses; gives the text to print for --help and --version, nothing when the program shall go on.
+/// --keygen FILE: ends the parsing wherever it stands, as --help does.
+struct KeygenRequest : CLI::Success {
+    explicit KeygenRequest(std::string name)
+        : CLI::Success("keygen", CLI::ExitCodes::Success), path(std::move(name)) {}
+    std::filesystem::path path;
+};
+inline CLI::Option* add_keygen(CLI::App& app) {
+    return app
+        .add_option_function<std::string>(
+            "--keygen", [](const std::string& path) { throw KeygenRequest(path); },
+            "write a new secret key to FILE and its public one to FILE.pub, print that, and leave")
+        ->trigger_on_parse()
+        ->type_name("FILE");
+}
+
+/// Parses; gives the text to print for --help, --version and --keygen, nothing when the program shall go on.
 inline Result<std::optional<std::string>> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
     app.set_version_flag("--version", app.get_name() + " " + program_version());
     app.get_formatter()->column_width(34);
@@ -91,6 +108,11 @@ inline Result<std::optional<std::string>> parse_arguments(CLI::App& app, int arg
         return std::optional<std::string>();
     } catch (const CLI::CallForHelp&) {
         return std::optional(app.help());
+    } catch (const KeygenRequest& request) {
+        const KeyPair keys = make_key_pair();
+        const auto written = write_key_files(request.path, keys);
+        if (!written) return written.error();
+        return std::optional(keys.public_key + "\n");
     } catch (const CLI::CallForVersion&) {
         return std::optional(app.version() + "\n");
     } catch (const CLI::ParseError& error) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "../common/arguments.hpp"
+#include "pathscope/session/door.hpp"
 #include "pathscope/session/scene_cache.hpp"
 
 namespace pathscope {
@@ -85,7 +86,7 @@ void add_levers(CLI::App& app, RenderOptions& options) {
         ->type_name("N");
 }
 
-void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) {
+void add_cluster_options(CLI::App& app, RenderOptions& options) {
     ClientConfig& client = options.client;
     app.add_option("--servers", client.local_servers, "local servers to start; 0 = render here (0)")
         ->check(CLI::Range(0, 256))
@@ -98,7 +99,6 @@ void add_cluster_options(CLI::App& app, RenderOptions& options, bool& insecure) 
            },
            "wait for servers at this address")
         ->type_name("ADDR");
-    app.add_flag("--insecure", insecure, "listen on other addresses than this machine's own, without keys");
     app.add_option("--min-servers", client.min_servers, "begin when so many are ready (1 with --listen)")
         ->check(CLI::Range(0, 4096))
         ->type_name("N");
@@ -145,8 +145,38 @@ void add_checkpoint_options(CLI::App& app, RenderOptions& options) {
         ->type_name("SECONDS");
 }
 
-bool is_loopback(const std::string& host) {
-    return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
+/// What was said about keys on the command line.
+struct KeyOptions {
+    std::filesystem::path key, allow;
+};
+
+void add_key_options(CLI::App& app, RenderOptions& options, KeyOptions& keys) {
+    const auto key = app.add_option("--key", keys.key,
+                                    "this client's secret key, as --keygen writes it; servers need keys then")
+                         ->type_name("FILE");
+    app.add_option("--allow", keys.allow,
+                   "public keys of the servers that may come in, one a line; read again when it changes")
+        ->needs(key)
+        ->type_name("FILE");
+    app.add_flag("--insecure", options.client.insecure,
+                 "listen on other addresses than this machine's own, without keys");
+    add_keygen(app);
+}
+
+/// Keys, or an address where none are needed, or the user's word.
+Result<void> check_keys(RenderOptions& options, const KeyOptions& keys) {
+    ClientConfig& client = options.client;
+    if (!keys.key.empty()) {
+        if (client.listens && keys.allow.empty())
+            return bad_input(
+                "--listen with --key needs --allow FILE: the public keys of the servers that may come in.");
+        const auto pair = read_secret_key_file(keys.key);
+        if (!pair) return pair.error();
+        client.keys = ClientKeys{*pair, keys.allow};
+        if (!keys.allow.empty())
+            if (const auto list = AllowList::open(keys.allow); !list) return list.error();
+    }
+    return client.listens ? check_listening(client) : Result<void>();
 }
 
 /// What --adaptive and --target-error need of other flags.
@@ -166,7 +196,7 @@ Result<void> check_sampling(const RenderOptions& options) {
 
 Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const char* const* argv) {
     RenderOptions options;
-    bool insecure = false;
+    KeyOptions keys;
     CLI::App app("Renders a scene to an image, alone or with render servers.", "pathscope-render");
 
     // The setting comes first whatever its place on the command line: single levers are pulled on top of it.
@@ -184,7 +214,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     add_lever(app, "--setting", setting, "all levers at once");
     add_levers(app, options);
     add_checkpoint_options(app, options);
-    add_cluster_options(app, options, insecure);
+    add_cluster_options(app, options);
+    add_key_options(app, options, keys);
 
     auto text = parse_arguments(app, argc, argv);
     if (!text) return text.error();
@@ -195,14 +226,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     if (app.count("--checkpoint-every") > 0 && !options.checkpoint.write)
         return bad_input("--checkpoint-every: no checkpoint is written; add --checkpoint or --continue.");
     options.client.ports_were_chosen = app.count("--ports") > 0;
-    if (options.client.listens) {
-        if (!is_loopback(options.client.host) && !insecure)
-            return bad_input(
-                fmt::format("--listen {}: other machines could reach this address, and nothing is "
-                            "encrypted or checked. Add --insecure if the network is trusted.",
-                            options.client.host));
-        if (app.count("--min-servers") == 0) options.client.min_servers = 1;
-    }
+    if (const auto safe = check_keys(options, keys); !safe) return safe.error();
+    if (options.client.listens && app.count("--min-servers") == 0) options.client.min_servers = 1;
     return std::variant<RenderOptions, std::string>(std::move(options));
 }
 

@@ -57,9 +57,6 @@ Result<void> RenderLoop::run(const std::atomic<bool>& interrupted) {
         log_note(fmt::format("Going on with {:.0f} % of direct and {:.0f} % of indirect light.",
                              100 * progress.direct, 100 * progress.indirect));
     }
-    if (session_.progress().waiting)
-        log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST",
-                             session_.endpoints()[1]));
     while (!session_.complete()) {
         session_.step(longest_step());
         line.show(session_.progress());

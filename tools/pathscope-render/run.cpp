@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include "pathscope/core/files.hpp"
@@ -127,6 +128,12 @@ ClientConfig complete_config(const RenderOptions& options) {
     return config;
 }
 
+void tell_how_to_join(const std::string& endpoint, const std::optional<ClientKeys>& keys) {
+    log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST{}",
+                         endpoint,
+                         keys ? fmt::format(" --key FILE --server-key '{}'", keys->pair.public_key) : ""));
+}
+
 }  // namespace
 
 Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& interrupted) {
@@ -155,6 +162,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
                               {*state, shared_scene, SceneDepot(*opened->files), std::move(*resume)}, store);
     if (!session) return session.error();
     const WorkHistory earlier = figures.resumed.value_or(WorkHistory{});
+    if ((*session)->progress().waiting) tell_how_to_join((*session)->endpoints()[1], options.client.keys);
     RenderLoop loop(**session, store, options.checkpoint, earlier, built);
     if (const auto done = loop.run(interrupted); !done) return done;
     const TimeNs rendered = monotonic_now();

@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
     ServerConfig config;
     config.cache_folder = SceneCache::default_folder();
     std::string mesh_cache;
+    std::string key_file, client_key;
     bool quiet = false;
     CLI::App app("Renders indirect light for a client; goes on trying until told to stop (Ctrl+C).",
                  "pathscope-server");
@@ -44,12 +45,27 @@ int main(int argc, char** argv) {
     app.add_option("--cache", config.cache_folder, "folder for scene files, by content; safe to delete")
         ->type_name("DIR");
     add_mesh_cache(app, mesh_cache);
+    const auto key = app.add_option("--key", key_file, "this server's secret key, as --keygen writes it")
+                         ->type_name("FILE");
+    const auto of_client =
+        app.add_option("--server-key", client_key, "the client's public key, or its .pub file")
+            ->type_name("KEY");
+    key->needs(of_client);
+    of_client->needs(key);
+    add_keygen(app);
     app.add_flag("--quiet", quiet, "say only what is wrong");
     const auto text = parse_arguments(app, argc, argv);
     if (!text) return report("pathscope-server", text.error());
     if (*text) {
         std::fputs((*text)->c_str(), stdout);
         return 0;
+    }
+    if (!key_file.empty()) {
+        const auto keys = read_secret_key_file(key_file);
+        if (!keys) return report("pathscope-server", keys.error());
+        const auto listener = public_key_of(client_key);
+        if (!listener) return report("pathscope-server", listener.error());
+        config.security = Dialler{*keys, *listener};
     }
     config.mesh_cache = mesh_cache_of(mesh_cache, config.cache_folder);
     if (quiet)

@@ -9,6 +9,7 @@
 /// Thread safety: one thread (socket.hpp).   Source: ZeroMQ RFC 29, zguide chapter 5.
 /// Test: tests/net/test_publisher_subscriber.cpp
 
+#include <deque>
 #include <string>
 
 #include "pathscope/core/frames.hpp"
@@ -33,12 +34,27 @@ class PublisherSocket {
     /// one for each subscriber of ours. Call it when pollable() is readable.
     int count_subscriptions();
 
+    /// Shows out those subscribers of a listener with keys whose keys are no longer on the list (security.hpp). To be
+    /// called when the list has changed; a subscriber says nothing by which it could be noticed later.
+    void disconnect_unlisted();
+
+    [[nodiscard]] const SocketHandle& handle() const { return socket_; }
     [[nodiscard]] Pollable pollable() const { return {socket_.get()}; }
 
   private:
+    struct Subscriber {
+        std::string key, address;
+        int descriptor;
+        bool operator==(const Subscriber&) const = default;
+    };
+
+    void remember(Subscriber subscriber);
+
     SocketHandle socket_;
     std::string endpoint_;
     int subscriptions_ = 0;
+    bool has_keys_ = false;
+    std::deque<Subscriber> subscribers_;  ///< With keys only; the latest, and some of them gone.
 };
 
 }  // namespace pathscope

@@ -30,6 +30,7 @@ struct KeyPair {
     std::string public_key, secret_key;
 };
 
+/// The public key begins with a letter or a digit, so that it looks like no flag and no comment.
 [[nodiscard]] KeyPair make_key_pair();
 
 /// The public key that belongs to a secret one; so a key file needs to hold the secret one only.
@@ -55,11 +56,20 @@ struct Dialler {
 using Security = std::variant<std::monostate, Listener, Dialler>;
 
 /// From here on, handshakes with listeners of this context succeed for these public keys and no others. A
-/// second call replaces the list; connections that stand stay. Refuses what is no key.
+/// second call replaces the list: a RouterSocket hears nobody any more who is not on it, a PublisherSocket shows such
+/// subscribers out when it is asked to. Refuses what is no key.
 [[nodiscard]] Result<void> admit_only(const Context& context, const std::vector<std::string>& public_keys);
 
+struct RefusedKey {
+    std::string public_key;
+    std::string address;  ///< Of the machine, as a number.
+};
+
+/// Who knocked with a key that is not listed, since the last call; at most 1,000.
+[[nodiscard]] std::vector<RefusedKey> take_refused_keys(const Context& context);
+
 /// Whether a listening endpoint can be reached from other machines: true for all but inproc, ipc and the
-/// loopback addresses of TCP (127.*, localhost).
+/// loopback addresses of TCP (127.0.0.0/8, ::1, localhost).
 [[nodiscard]] bool reaches_other_machines(std::string_view endpoint);
 
 }  // namespace pathscope

@@ -36,6 +36,8 @@ struct SocketOptions {
     /// session's heartbeats, so that a server that is only frozen is judged by the failure detector and not
     /// by the transport.
     int transport_heartbeat_ms = 5000;
+    /// Who has connected and not yet said who it is, by ZeroMQ's handshake, is shown out after this time.
+    int handshake_ms = 10'000;
     int backlog = 4096;  ///< Connections waiting to be accepted: servers may join by the hundred.
     Security security;   ///< Keys (security.hpp); none by default.
 };
@@ -53,21 +55,26 @@ struct Pollable {
     bool to_send = false;    ///< Wait until it can send instead of until it can receive.
 };
 
-/// The ZeroMQ socket inside each of our sockets. Moves, closes, and keeps its context alive.
+/// An open ZeroMQ socket; closed at the end. Keeps its context alive.
+struct OpenSocket {
+    std::shared_ptr<ContextState> context;
+    void* socket;
+    ~OpenSocket();
+};
+
+/// The ZeroMQ socket inside each of our sockets. Moves; a ConnectionWatch may ask whether it is still open.
 class SocketHandle {
   public:
     SocketHandle() = default;
     SocketHandle(std::shared_ptr<ContextState> context, void* socket)
-        : context_(std::move(context)), socket_(socket) {}
-    SocketHandle(SocketHandle&& other) noexcept;
-    SocketHandle& operator=(SocketHandle&& other) noexcept;
-    ~SocketHandle();
+        : open_(new OpenSocket{std::move(context), socket}) {}
 
-    [[nodiscard]] void* get() const { return socket_; }
+    [[nodiscard]] void* get() const { return open_ ? open_->socket : nullptr; }
+    [[nodiscard]] const ContextState& context() const { return *open_->context; }
+    [[nodiscard]] std::weak_ptr<OpenSocket> watched() const { return open_; }
 
   private:
-    std::shared_ptr<ContextState> context_;
-    void* socket_ = nullptr;
+    std::shared_ptr<OpenSocket> open_;
 };
 
 /// Handles at most `at_most` waiting messages and returns how many there were: with more than one socket or a

@@ -24,6 +24,7 @@ class SubscriberSocket {
     /// The next message that is waiting, if any. Never blocks.
     [[nodiscard]] std::optional<Frames> receive();
 
+    [[nodiscard]] const SocketHandle& handle() const { return socket_; }
     [[nodiscard]] Pollable pollable() const { return {socket_.get()}; }
 
   private:

@@ -21,6 +21,7 @@ enum class Counter {
     stale_dropped,       ///< Results of an old epoch.
     refused_results,     ///< Results that belong to no lease, or not to the lease they name.
     bad_messages,        ///< Malformed, oversized, out of place, unauthorised.
+    refused_peers,       ///< Connections turned away before a message of theirs was read.
     nonfinite_dropped,   ///< Samples whose radiance was not finite or negative.
     samples,             ///< Of pixels, merged; rounds_committed counts what they came in.
     tiles,               ///< Results of servers that were merged.
@@ -44,6 +45,7 @@ inline constexpr std::array k_counter_names{
     EnumName{Counter::stale_dropped, "stale_dropped"},
     EnumName{Counter::refused_results, "refused_results"},
     EnumName{Counter::bad_messages, "bad_messages"},
+    EnumName{Counter::refused_peers, "refused_peers"},
     EnumName{Counter::nonfinite_dropped, "nonfinite_dropped"},
     EnumName{Counter::samples, "samples"},
     EnumName{Counter::tiles, "tiles"},

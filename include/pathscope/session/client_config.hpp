@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "pathscope/bvh/tree.hpp"
@@ -13,13 +14,22 @@
 #include "pathscope/cluster/failure_detector.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
+#include "pathscope/net/security.hpp"
 
 namespace pathscope {
 
 inline constexpr std::array k_default_ports{5555, 5556, 5557};  ///< input, monitor, frames
 
+/// With them, only listed servers come in, and everything is encrypted (net/security.hpp).
+struct ClientKeys {
+    KeyPair pair;
+    std::filesystem::path allow_list;  ///< Of servers' public keys; empty: local servers only.
+};
+
 struct ClientConfig {
     std::string host = "127.0.0.1";  ///< Address to bind to.
+    std::optional<ClientKeys> keys;
+    bool insecure = false;  ///< The user insists on an address that other machines can reach, without keys.
     std::array<int, 3> ports = k_default_ports;
     bool any_ports = false;  ///< Take whichever ports are free; endpoints() tells which.
     bool ports_were_chosen =

@@ -87,6 +87,9 @@ class ClientMachine {
     /// with the detector `fixed`, which is that of the classic system.
     void on_connection_lost(TimeNs now);
 
+    /// A server may take part no longer.
+    void on_revoked(const std::string& instance, std::string_view why, TimeNs now);
+
     /// This process itself did not run for so long: that silence proves nothing about servers.
     void on_own_pause(TimeNs pause);
 

@@ -14,12 +14,12 @@
 #include <string>
 #include <vector>
 
-#include "pathscope/net/connection_watch.hpp"
 #include "pathscope/net/context.hpp"
 #include "pathscope/net/publisher.hpp"
 #include "pathscope/net/router.hpp"
 #include "pathscope/session/child_process.hpp"
 #include "pathscope/session/client_machine.hpp"
+#include "pathscope/session/door.hpp"
 
 namespace pathscope {
 
@@ -57,7 +57,6 @@ class ClientSession : private ClientWorld {
         PublisherSocket input;
         RouterSocket monitor;
         RouterSocket frames;
-        ConnectionWatch watch_monitor, watch_frames;
     };
     struct LocalServer {
         ChildProcess process;
@@ -69,7 +68,7 @@ class ClientSession : private ClientWorld {
     Result<void> open_sockets();
     Result<void> start_local_servers();
     void receive(RouterSocket& socket, Channel channel);
-    void watch(ConnectionWatch& connections);
+    void watch_door();
     void watch_local_servers();
 
     // The world, as the machine sees it.
@@ -79,8 +78,10 @@ class ClientSession : private ClientWorld {
     void cancel_all() override { runner_.cancel_all(); }
 
     ClientConfig config_;
+    EventStore& store_;
     Context context_;
     WakePair wake_;
+    std::optional<Door> door_;
     std::optional<Sockets> sockets_;
     std::array<std::string, 3> endpoints_;
     std::vector<LocalServer> local_servers_;

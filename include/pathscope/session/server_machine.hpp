@@ -68,6 +68,8 @@ class ServerMachine {
 
     /// New sockets, by that routing id, are on their way to the client. Ensures: linked().
     void on_linked(std::string instance, TimeNs now);
+    /// The client's door did not let it in, and told so on the connection itself: new sockets are needed.
+    void on_refused(TimeNs now);
     void on_message(Frames frames, Channel channel, TimeNs now);
     void on_outcome(RoundOutcome& outcome, TimeNs now);
     void on_loaded(LoadedScene& loaded, TimeNs now);
@@ -86,6 +88,7 @@ class ServerMachine {
     // -- View -----------------------------------------------------------------------------------------------
 
     [[nodiscard]] bool linked() const { return linked_; }
+    [[nodiscard]] bool welcomed() const { return linked_ && phase_ != Phase::hello; }
     /// The client said stop, or refused this server for good: refusal() tells why.
     [[nodiscard]] bool ended() const { return ended_; }
     [[nodiscard]] const std::optional<Error>& refusal() const { return refusal_; }
@@ -150,7 +153,8 @@ class ServerMachine {
 
     std::string instance_;
     bool linked_ = false;
-    std::string relink_reason_;  ///< Not empty: drop the link once the messages at hand are handled.
+    /// Drop the link once the messages at hand are handled; empty if there is nothing to tell.
+    std::optional<std::string> relink_reason_;
     Phase phase_ = Phase::hello;
     bool draining_ = false;
 

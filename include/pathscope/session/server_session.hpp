@@ -19,6 +19,7 @@
 #include "pathscope/net/subscriber.hpp"
 #include "pathscope/net/wake_pair.hpp"
 #include "pathscope/session/client_config.hpp"
+#include "pathscope/session/refusal.hpp"
 #include "pathscope/session/server_machine.hpp"
 #include "pathscope/session/worker.hpp"
 
@@ -27,8 +28,9 @@ namespace pathscope {
 struct ServerConfig {
     std::string host = "127.0.0.1";  ///< Of the client.
     std::array<int, 3> ports = k_default_ports;
-    std::string name;  ///< For people; empty = host name and process id.
-    int threads = 0;   ///< 0 = all cores.
+    Security security;  ///< A Dialler, or none.
+    std::string name;   ///< For people; empty = host name and process id.
+    int threads = 0;    ///< 0 = all cores.
     TreeKind tree = TreeKind::wide;
     double samples_per_second = 0;  ///< Speed cap; 0 = none.
     std::filesystem::path cache_folder;
@@ -51,11 +53,14 @@ class ServerSession : private ServerWorld {
     struct Link {
         SubscriberSocket input;
         DealerSocket monitor;
+        ConnectionWatch watch;  ///< Of monitor; the others share its fate.
         DealerSocket frames;
     };
 
     explicit ServerSession(ServerConfig config, WakePair wake);
+    void wait_to_dial();
     Result<void> dial();
+    void on_connection_changes();
     void step();
     template <class Socket>
     void receive(Socket& socket, Channel channel);
@@ -72,6 +77,7 @@ class ServerSession : private ServerWorld {
     Context context_;
     WakePair wake_;
     std::atomic<bool> stop_requested_{false};
+    Redial redial_;
     std::optional<Link> link_;
     SceneCache cache_;
     ServerMachine machine_;

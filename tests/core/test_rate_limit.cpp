@@ -1,0 +1,26 @@
+#include "pathscope/core/rate_limit.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+
+TEST_CASE("a token bucket allows a burst, then its rate, and never saves up more than the burst") {
+    TimeNs now = 5 * k_second_ns;
+    TokenBucket bucket({10, 3}, now);
+    const auto allowed_of = [&](int attempts) {
+        int allowed = 0;
+        for (int i = 0; i < attempts; ++i) allowed += bucket.allow(now);
+        return allowed;
+    };
+    CHECK(allowed_of(100) == 3);
+    now += 99 * k_millisecond_ns;
+    CHECK(allowed_of(100) == 0);
+    now += 2 * k_millisecond_ns;
+    CHECK(allowed_of(100) == 1);
+    now += 3600 * k_second_ns;
+    CHECK(allowed_of(100) == 3);
+    int allowed = 0;  // In any ten seconds: burst + 10 rate.
+    for (int ms = 0; ms < 10'000; ++ms, now += k_millisecond_ns) allowed += bucket.allow(now);
+    CHECK(allowed >= 99);
+    CHECK(allowed <= 100);
+}
