@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <system_error>
 #include <utility>
 
 #include "pathscope/core/files.hpp"
@@ -63,7 +64,13 @@ CheckpointWriter::Written CheckpointWriter::write() const {
 
 void CheckpointWriter::begin_write(TimeNs now) {
     next_ = now + every_;
-    writing_ = std::async(std::launch::async, [this] { return write(); });
+    try {
+        writing_ = std::async(std::launch::async, [this] { return write(); });
+    } catch (const std::system_error& error) {  // No thread is to be had.
+        std::promise<Written> none;
+        none.set_value({failed(fmt::format("Cannot write {}: {}.", path_.string(), error.what()))});
+        writing_ = none.get_future();
+    }
 }
 
 /// Waits for the write under way, if there is one, and says what changed.
