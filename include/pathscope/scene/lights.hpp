@@ -60,7 +60,8 @@ struct TriangleLight {
     bool even = false;
     TriangleCorners corners{};
     Vec3 normal{};  ///< As surface_point() gives it.
-    float longest_side = 0;
+    Vec3 centre{};
+    float longest_side = 0;  ///< Of its box.
 };
 
 /// A sphere that emits the same radiance everywhere, outwards, and is black inside.
