@@ -2,6 +2,7 @@
 
 #include "lookup.hpp"
 #include "pathscope/math/frame.hpp"
+#include "pathscope/sampling/spherical_triangle.hpp"
 #include "pathscope/sampling/warp.hpp"
 
 namespace pathscope {
@@ -43,14 +44,41 @@ std::optional<LightSample> unless_dark(const Request& request, LightSample sampl
 
 // ---- Surfaces.
 
-float triangle_pdf(const Connection& to_light, const TriangleLight& light, Vec3 normal) {
-    return to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
+/// Solid angles that are sampled: of triangles seen edge-on, and from their own plane, too few digits are left.
+constexpr float k_least_solid_angle = 1e-4f, k_most_solid_angle = 6.28f;
+
+using SeenTriangle = std::optional<SphericalTriangle>;
+
+/// Apart from the test below, which most of the time ends the matter.
+[[gnu::noinline]] SeenTriangle see_near_light(const TriangleLight& light, Vec3 position) {
+    const auto& [a, b, c] = light.corners;
+    const SphericalTriangle seen = see_triangle(position, a, b, c);
+    const float solid_angle = seen.solid_angle();
+    if (!(solid_angle > k_least_solid_angle && solid_angle < k_most_solid_angle)) return std::nullopt;
+    return seen;
+}
+
+/// The triangle as the reference sees it, if it is sampled by solid angle. Density and sampling both ask here, so that they
+/// agree.
+SeenTriangle seen_from_near(LightSampling sampling, const LightReference& reference,
+                            const TriangleLight& light) {
+    const bool near =
+        length_squared(light.centre - reference.position) < light.longest_side * light.longest_side;
+    if (!near || sampling == LightSampling::area) return std::nullopt;
+    return see_near_light(light, reference.position);
+}
+
+float triangle_pdf(const SeenTriangle& seen, const Connection& to_light, const TriangleLight& light,
+                   Vec3 normal) {
+    return seen ? sample_spherical_triangle_pdf(*seen)
+                : to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
 }
 
 std::optional<LightSample> sample(const Request& request, const TriangleLight& light) {
     std::optional<LightSample>
         sample;  // The only thing returned, so that it is made where the caller wants it.
-    const Vec2 weights = sample_triangle(request.u);
+    const SeenTriangle seen = seen_from_near(request.sampling, request.reference, light);
+    const Vec2 weights = seen ? sample_spherical_triangle(*seen, request.u) : sample_triangle(request.u);
     SurfacePoint point;
     if (light.even) {
         point.position = exact_point(light.corners, weights.x, weights.y);
@@ -62,7 +90,7 @@ std::optional<LightSample> sample(const Request& request, const TriangleLight& l
     const Connection to_light(request.reference, point.position);
     if (!to_light.valid()) return sample;
     const bool faces_reference = light.two_sided || dot(point.geometric_normal, to_light.direction) < 0;
-    const float pdf = request.pick_probability * triangle_pdf(to_light, light, point.geometric_normal);
+    const float pdf = request.pick_probability * triangle_pdf(seen, to_light, light, point.geometric_normal);
     if (!faces_reference || !(pdf > 0)) return sample;
 
     sample.emplace();
@@ -227,7 +255,9 @@ float sample_light_pdf(const Scene& scene, LightSampling sampling, const LightRe
     const float probability = pick_probability(scene.lights, sampling, reference, hit.light);
     if (const auto* sphere = std::get_if<SphereLight>(&light))
         return probability * sphere_pdf(sampling, reference, to_light, scene.spheres[sphere->sphere], normal);
-    return probability * triangle_pdf(to_light, std::get<TriangleLight>(light), normal);
+    const auto& triangle = std::get<TriangleLight>(light);
+    return probability *
+           triangle_pdf(seen_from_near(sampling, reference, triangle), to_light, triangle, normal);
 }
 
 float sample_environment_pdf(const Scene& scene, LightSampling sampling, const LightReference& reference,

@@ -180,6 +180,7 @@ TriangleLight make_triangle_light(const Mesh& mesh, std::uint32_t triangle, cons
     light.mean_radiance = mean_radiance;
     light.two_sided = material.two_sided_emission;
     light.longest_side = longest_side(light.corners);
+    light.centre = (light.corners.a + light.corners.b + light.corners.c) * (1 / 3.0f);
     light.normal = surface_point(mesh, {0, 1 / 3.0f, 1 / 3.0f, triangle}).geometric_normal;
     light.even = !material.map_ke && !material.map_d && has_one_normal(mesh, triangle, light.normal);
     return light;

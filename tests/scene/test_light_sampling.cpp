@@ -261,17 +261,79 @@ TEST_CASE("what light sampling reports is what MIS computes for the same directi
     }
 }
 
+TEST_CASE("density and sampling of a triangle agree on whether it is near, wherever it is seen from") {
+    const Scene scene = small_scene({ceiling_light()});
+    for (const LightSampling sampling : k_all) {
+        HashRng rng(9);
+        int compared = 0, differ = 0;
+        for (int i = 0; i < 20'000; ++i) {
+            // From 1/500 of the lamp's size to ten times as far, below it and beside it.
+            const float distance = 0.005f * std::pow(5000.0f, rng.next_float());
+            const float x = 4 * rng.next_float() - 2, z = 4 * rng.next_float() - 2;
+            const LightReference reference{{x, 2 - distance, z}, {0, 1, 0}};
+            const float u_pick = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+            const auto sample = sample_light(scene, sampling, reference, u_pick, {u, v});
+            if (!sample) continue;
+            const auto hit = intersect(scene, {reference.position, sample->direction});
+            if (!hit || hit->light != sample->light) continue;  // Past an edge, by rounding.
+            ++compared;
+            const double pdf = sample_light_pdf(scene, sampling, reference, *hit);
+            if (std::abs(pdf / sample->pdf_solid_angle - 1) > 1e-3) ++differ;
+        }
+        CHECK(compared > 19'000);
+        CHECK(differ < compared / 200);
+    }
+}
+
+TEST_CASE("close to a lamp, by solid angle all samples count the same; by area, few outshine the others") {
+    const Scene scene = small_scene({ceiling_light()});
+    // In front of the lamp by 1/100, near a corner; of the quarters around it all but one are as good as infinite.
+    const SurfacePoint at = receiver({-0.99f, 1.99f, -1.49f}, {0, 1, 0});
+    double expected = 0;
+    for (const double a : {0.01, 1.99})
+        for (const double b : {0.01, 2.99}) expected += k_pi64 * corner_form_factor(a, b, 0.01);
+    for (const LightSampling sampling : {LightSampling::power, LightSampling::tree}) {
+        const Moments found = estimate_irradiance(scene, sampling, at, 20'000);
+        CHECK(std::abs(found.mean() - expected) <= 4 * found.standard_error() + 1e-5 * expected);
+        CHECK(found.standard_error() < 0.01 * expected);
+    }
+    const Moments by_area = estimate_irradiance(scene, LightSampling::area, at, 20'000);
+    CHECK(std::abs(by_area.mean() - expected) <= 4 * by_area.standard_error());
+    CHECK(by_area.standard_error() > 0.1 * expected);
+
+    // Without the cosine of the surface there is nothing left to vary but which of the two triangles was picked.
+    HashRng rng(3);
+    std::vector<double> values;
+    for (int i = 0; i < 1000; ++i) {
+        const float u_pick = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+        const auto sample =
+            sample_light(scene, LightSampling::power, {at.position, at.shading_normal}, u_pick, {u, v});
+        REQUIRE(sample);
+        values.push_back(sample->radiance.x / sample->pdf_solid_angle);
+    }
+    std::sort(values.begin(), values.end());
+    CHECK(std::unique(values.begin(), values.end()) - values.begin() == 2);
+}
+
 TEST_CASE("each light sampler draws directions with the density it reports") {
     struct Case {
         std::string name;
         Scene scene;
         LightSampling sampling = LightSampling::power;
     };
-    // Of one light, `area` differs from `power` for spheres only.
+    // Of one light, `area` differs from `power` for spheres and for triangles that are near.
     const auto sphere = [] { return small_scene({SphereLightSpec{{1, 1, 1}, 1.2f, k_white}}); };
     const auto overlap = [] { return small_scene({ceiling_light(), SkySpec{{0.1f, 0.1f, 0.1f}}}); };
     std::vector<Case> cases;
-    cases.push_back({"quad", small_scene({ceiling_light()})});
+    const auto quad = [](float height) {
+        QuadLightSpec spec = ceiling_light();
+        spec.corner.y = height;
+        return small_scene({spec});
+    };
+    cases.push_back({"quad", quad(2)});
+    cases.push_back({"quad by area", quad(2), LightSampling::area});
+    cases.push_back({"quad that is far", quad(4)});
+    cases.push_back({"quad that is close", quad(0.1f)});
     cases.push_back({"sphere", sphere()});
     cases.push_back({"sphere by area", sphere(), LightSampling::area});
     cases.push_back({"sky", small_scene({SkySpec{k_white}})});
