@@ -68,9 +68,17 @@ const PeerTransition* Peer::apply(Liveness liveness, TimeNs now) {
     return nullptr;
 }
 
-void Credits::take(LeaseId lease, TimeNs written_off_at) {
+void Credits::take(LeaseId lease, TimeNs now, TimeNs written_off_at) {
     CHECK(available(), debts_.size(), limit_);
-    debts_.push_back({lease, written_off_at});
+    debts_.push_back({lease, now, written_off_at});
+}
+
+std::vector<LeaseId> Credits::settle_lost(LeaseId received, TimeNs sent_before) {
+    std::vector<LeaseId> lost;
+    for (const Debt& debt : debts_)
+        if (debt.lease <= received || debt.taken < sent_before) lost.push_back(debt.lease);
+    for (const LeaseId lease : lost) settle(lease);
+    return lost;
 }
 
 bool Credits::settle(LeaseId lease) {

@@ -157,6 +157,7 @@ template <class Field, Is<message::Credit> M>
 void describe(Field& field, M& m) {
     describe_session(field, m);
     field.u32("credits", m.credits, 0, k_max_credits);
+    field.u64("received", m.received.value, 0, k_max_u64);
 }
 
 template <class Field, Is<message::Lease> M>

@@ -11,6 +11,9 @@ namespace {
 constexpr std::size_t k_max_servers = 4096;
 constexpr std::uint32_t k_server_credits = 2;  ///< One round in work, one waiting: no pause between them.
 
+/// A LEASE that has not arrived after this time will not.
+constexpr TimeNs k_longest_way = 2 * k_second_ns;
+
 /// When a server may believe that its client is gone: late, since nothing is lost by waiting.
 TimeNs dead_after_of(DetectorKind kind) {
     return kind == DetectorKind::fixed ? 20 * k_second_ns : 5 * k_second_ns;
@@ -105,8 +108,13 @@ void ClientMachine::on(Server& server, message::Ready& message) {
     servers_changed();
 }
 
+/// Only a server that owes no answer sends it. So whatever the client believes it to owe was lost, as with a connection
+/// that broke; unless it was sent so recently that it may still be on its way.
 void ClientMachine::on(Server& server, message::Credit& message) {
-    if (message.session == session_) server.credits.set_limit(std::min(message.credits, k_server_credits));
+    if (message.session != session_) return;
+    server.credits.set_limit(std::min(message.credits, k_server_credits));
+    for (const LeaseId lease : server.credits.settle_lost(message.received, now_ - k_longest_way))
+        work_.indirect_ledger().release(lease, server.peer.id(), now_);
 }
 
 void ClientMachine::on(Server& server, message::Bye& message) {

@@ -89,7 +89,7 @@ bool ClientMachine::grant_to(Server& server) {
 
 void ClientMachine::send_lease(Server& server, const Lease& lease) {
     const TimeNs duration = lease.deadline - now_;
-    server.credits.take(lease.id, lease.deadline + duration);
+    server.credits.take(lease.id, now_, lease.deadline + duration);
     message::Lease message;
     message.session = session_;
     message.lease = lease.id;

@@ -47,6 +47,7 @@ void ServerMachine::lose_link() {
     missed_since_.reset();
     snapshot_asked_.reset();
     session_ = 0;
+    received_ = {};
     relink_reason_.reset();
     linked_ = false;
 }
@@ -86,7 +87,7 @@ void ServerMachine::beat() {
                                std::uint32_t(leases_.size())});
     next_ping_ = now_ + heartbeat_;
     if (!leases_.empty() || !unsent_answers_.empty() || draining_) return;
-    send_answer(message::Credit{session_, credits_});
+    send_answer(message::Credit{session_, credits_, received_});
     if (phase_ == Phase::work) send_ready();
 }
 

@@ -24,7 +24,7 @@ void ServerMachine::on(message::Welcome& message) {
     if (phase_ == Phase::hello) {
         phase_ = Phase::sync;
         next_ping_ = now_;
-        send_answer(message::Credit{session_, credits_});
+        send_answer(message::Credit{session_, credits_, received_});
     }
     take_state(message.state, message.epoch, message.sequence, message.state_hash);
 }

@@ -10,6 +10,7 @@ namespace pathscope {
 
 void ServerMachine::on(message::Lease& lease) {
     if (lease.session != session_ || !held_ || holds_lease(lease.lease)) return;
+    received_ = std::max(received_, lease.lease);
     if (draining_) return refuse(lease, NackCode::draining);
     if (leases_.size() >= credits_) return refuse(lease, NackCode::busy);
     if (lease.epoch != held_->epoch) {

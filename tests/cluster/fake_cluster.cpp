@@ -315,7 +315,7 @@ void FakeCluster::hand_out_to(ServerId id, Seat& seat) {
                     ledger_.grant_copy(id, *late, now_, lease_duration(predicted, ledger_.attempts(*late)));
         }
         if (!lease) return;
-        seat.credits.take(lease->id, lease->deadline + (lease->deadline - lease->granted));
+        seat.credits.take(lease->id, now_, lease->deadline + (lease->deadline - lease->granted));
         send([this, p = seat.process, lease = *lease, image = image_] { take(p, lease, image); });
     }
 }

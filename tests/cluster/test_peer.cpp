@@ -91,8 +91,8 @@ TEST_CASE("a detector's opinion becomes at most one step") {
 TEST_CASE("credits bound what a server owes, come back with answers, and are written off in the end") {
     Credits credits(2);
     CHECK(credits.available());
-    credits.take(LeaseId{1}, 100);
-    credits.take(LeaseId{2}, 200);
+    credits.take(LeaseId{1}, 0, 100);
+    credits.take(LeaseId{2}, 0, 200);
     CHECK_FALSE(credits.available());
     CHECK_FALSE(credits.settle(LeaseId{3}));
     CHECK(credits.settle(LeaseId{2}));
@@ -101,9 +101,18 @@ TEST_CASE("credits bound what a server owes, come back with answers, and are wri
     CHECK(credits.write_off(99) == 0);
     CHECK(credits.write_off(100) == 1);
     CHECK(credits.owed() == 0);
-    credits.take(LeaseId{4}, 100);
+    credits.take(LeaseId{4}, 0, 100);
     credits.set_limit(1);
     CHECK_FALSE(credits.available());
     credits.clear();
     CHECK(credits.available());
+}
+
+TEST_CASE("a server that owes nothing tells which leases were lost, with their answer or on their way") {
+    Credits credits(4);
+    for (const std::uint64_t lease : {3, 5, 6, 8}) credits.take(LeaseId{lease}, TimeNs(10 * lease), 1000);
+    CHECK(credits.settle_lost(LeaseId{2}, 30).empty());  // None of them can have been missed yet.
+    CHECK(credits.settle_lost(LeaseId{5}, 30) == std::vector{LeaseId{3}, LeaseId{5}});  // Answered, not heard.
+    CHECK(credits.settle_lost(LeaseId{5}, 61) == std::vector{LeaseId{6}});              // Sent long ago.
+    CHECK(credits.owed() == 1);
 }

@@ -127,7 +127,7 @@ TEST_CASE("the document's faults are those that decode tells apart, in its order
 }
 
 TEST_CASE("the document's bytes are what the code sends") {
-    const Frames frames = encode(message::Credit{77, 4});
+    const Frames frames = encode(message::Credit{77, 4, LeaseId{3}});
     CHECK(read_document().hex == to_hex_text(frames[0]) + "\n" + to_hex_text(frames[1]) + "\n");
 }
 

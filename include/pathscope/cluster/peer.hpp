@@ -105,10 +105,15 @@ class Credits {
     [[nodiscard]] bool available() const { return debts_.size() < limit_; }
 
     /// Requires: available().
-    void take(LeaseId lease, TimeNs written_off_at);
+    void take(LeaseId lease, TimeNs now, TimeNs written_off_at);
 
     /// The server answered for this lease. False if it owed nothing for it.
     bool settle(LeaseId lease);
+
+    /// The server says that it owes nothing, and that `received` is the largest lease that reached it. So what is owed up to
+    /// that one was answered, and the answer was lost; of the others, those taken before `sent_before` were lost on their
+    /// way. Settles both, and returns them.
+    std::vector<LeaseId> settle_lost(LeaseId received, TimeNs sent_before);
 
     /// Forgets debts due at or before now; returns how many.
     std::size_t write_off(TimeNs now);
@@ -119,6 +124,7 @@ class Credits {
   private:
     struct Debt {
         LeaseId lease;
+        TimeNs taken;
         TimeNs written_off_at;
     };
     std::size_t limit_;

@@ -173,6 +173,7 @@ struct Input {
 struct Credit {
     std::uint64_t session = 0;
     std::uint32_t credits = 0;
+    LeaseId received{};  ///< The largest lease that reached the server; 0 = none.
     bool operator==(const Credit&) const = default;
 };
 

@@ -161,6 +161,7 @@ class ServerMachine {
     // What the client told.
     std::uint64_t session_ = 0;
     std::uint32_t credits_ = 0;
+    LeaseId received_{};  ///< The largest so far.
     TimeNs heartbeat_ = 250 * k_millisecond_ns;
     TimeNs dead_after_ = 2 * k_second_ns;
     std::optional<HeldState> held_;
