@@ -112,7 +112,8 @@ TEST_CASE("a server that owes nothing tells which leases were lost, with their a
     Credits credits(4);
     for (const std::uint64_t lease : {3, 5, 6, 8}) credits.take(LeaseId{lease}, TimeNs(10 * lease), 1000);
     CHECK(credits.settle_lost(LeaseId{2}, 30).empty());  // None of them can have been missed yet.
-    CHECK(credits.settle_lost(LeaseId{5}, 30) == std::vector{LeaseId{3}, LeaseId{5}});  // Answered, not heard.
-    CHECK(credits.settle_lost(LeaseId{5}, 61) == std::vector{LeaseId{6}});              // Sent long ago.
+    CHECK(credits.settle_lost(LeaseId{5}, 30) ==
+          std::vector{LeaseId{3}, LeaseId{5}});                             // Answered, not heard.
+    CHECK(credits.settle_lost(LeaseId{5}, 61) == std::vector{LeaseId{6}});  // Sent long ago.
     CHECK(credits.owed() == 1);
 }

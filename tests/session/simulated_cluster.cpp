@@ -10,7 +10,9 @@
 namespace pathscope::testing {
 namespace {
 
-constexpr TimeNs k_epilogue = 15 * k_second_ns;  ///< After the end: late messages still come, states settle.
+/// After the end: late messages still come, states settle, and `fixed` takes 12 s, and as long as the
+/// client was paused, to see a death.
+constexpr TimeNs k_epilogue = 30 * k_second_ns;
 constexpr TimeNs k_dial_time = 20 * k_millisecond_ns;
 /// Without progress though someone could work. Leases that are lost time out one after the other, each later.
 constexpr TimeNs k_longest_wait = 150 * k_second_ns;
