@@ -111,7 +111,8 @@ void ClientMachine::on(Server& server, message::Ready& message) {
 /// Only a server that owes no answer sends it. So whatever the client believes it to owe was lost, as with a connection
 /// that broke; unless it was sent so recently that it may still be on its way.
 void ClientMachine::on(Server& server, message::Credit& message) {
-    if (message.session != session_) return;
+    // It was welcomed by the client that ran before this one, and does not hear what this one says.
+    if (message.session != session_) return ask_who(server.instance);
     server.credits.set_limit(std::min(message.credits, k_server_credits));
     for (const LeaseId lease : server.credits.settle_lost(message.received, now_ - k_longest_way))
         work_.indirect_ledger().release(lease, server.peer.id(), now_);
