@@ -54,7 +54,8 @@ std::string refusal_at_server(RefusalReason reason, const std::string& where, co
                 break;
         }
         return keys ? "it hung up in the middle of the handshake. Most likely --server-key is not its public "
-                      "key."
+                      "key, "
+                      "or it was started without --key."
                     : "it hung up in the middle of the handshake.";
     };
     return fmt::format("The client at {} refuses this server: {}", where, why());
