@@ -280,7 +280,7 @@ TEST_CASE("garbage, foreign versions and unknown peers are dropped and counted, 
     tile.codec = "raw";
     send(frames, encode(tile));
     Frames foreign = encode(message::Hello{std::string(16, 'x'), "n", "v", build_identity(), 1, 0});
-    foreign[0][2] = 99;
+    foreign[0] = message_head(99, std::uint8_t(MessageType::hello), foreign[1]);
     send(monitor, foreign);
     std::optional<Frames> answer;
     Decoded reject = DecodeError{};
