@@ -20,7 +20,6 @@ SEEDS = 100
 PATIENCE_S = 600
 
 LEDGER = "src/cluster/ledger.cpp"
-CLIENT = "src/session/client_machine.cpp"
 SERVER = "src/session/server_machine.cpp"
 SERVER_STATE = "src/session/server_state.cpp"
 
@@ -130,9 +129,6 @@ class Mutants(unittest.TestCase):
     def test_a_server_never_asks_for_a_snapshot(self):
         self.check(SERVER_STATE, ("    if (send_monitor(message::SnapshotRequest{",
                                   "    if (!held_ && send_monitor(message::SnapshotRequest{"))
-
-    def test_a_client_never_asks_who(self):
-        self.check(CLIENT, ("        return ask_who(instance);\n", "        return;\n"), seeds=1000)
 
 
 if __name__ == "__main__":
