@@ -46,7 +46,7 @@ void ChaosStream::set_faults(const ChaosFaults& faults, TimeNs now) {
     const bool other_rate = faults.bytes_per_second != faults_.bytes_per_second;
     faults_ = faults;
     if (other_flips) draw_next_flip(taken_);
-    if (other_rate) bucket_.set_rate(faults.bytes_per_second, now);
+    if (other_rate) bucket_.set_limit(line_limit(faults.bytes_per_second), now);
 
     // The least of due times in order and one bound is in order.
     const TimeNs latest = now + faults.delay + faults.jitter;
@@ -109,12 +109,14 @@ void ChaosStream::flip_bytes(std::uint64_t begin, std::uint64_t end) {
     }
 }
 
-/// Under a rate, bytes wait until there are some of them: depends on the first chunk alone, so that the time
+/// Under a rate, bytes wait until there is a share of them worth waking up for, a quarter of the depth, so that a sleeper who
+/// comes late loses nothing. Depends on the first chunk alone, so that the time
 /// next_due() names is one at which ready() has something.
 std::size_t ChaosStream::worth_sending() const {
     const auto first =
         std::size_t(std::min<std::uint64_t>(chunks_.front().end - left_, queue_.front().size()));
-    return std::min(first, bucket_.worthwhile());
+    const auto share = std::size_t(std::max(1.0, bucket_.limit().depth / 4));
+    return bucket_.limit().limits() ? std::min(first, share) : 1;
 }
 
 std::span<const std::byte> ChaosStream::ready(TimeNs now) const {

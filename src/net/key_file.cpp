@@ -9,6 +9,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "descriptor.hpp"
 #include "pathscope/core/files.hpp"
 
 namespace pathscope {
@@ -18,25 +19,17 @@ constexpr std::size_t k_max_secret_file_bytes = 4096;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-/// A descriptor that closes itself.
-struct Descriptor {
-    int number = -1;
-    ~Descriptor() {
-        if (number >= 0) ::close(number);
-    }
-};
-
 std::filesystem::path public_file_of(std::filesystem::path path) { return path += ".pub"; }
 
 /// 0 or an errno. The file is written under a name of its own and then linked to the one that is wanted, which fails
 /// if that is taken: so it is there whole or not at all, and nothing is ever overwritten.
 int create_file(const std::filesystem::path& path, std::string_view bytes, mode_t mode) {
     std::string part = path.string() + ".partXXXXXX";
-    const Descriptor file{::mkostemp(part.data(), O_CLOEXEC)};  // Made with mode 0600.
-    if (file.number < 0) return errno;
+    const Descriptor file(::mkostemp(part.data(), O_CLOEXEC));  // Made with mode 0600.
+    if (!file) return errno;
     int error = 0;
-    if (::write(file.number, bytes.data(), bytes.size()) != ssize_t(bytes.size()) ||
-        ::fchmod(file.number, mode) != 0 || ::fsync(file.number) != 0 ||
+    if (::write(file.get(), bytes.data(), bytes.size()) != ssize_t(bytes.size()) ||
+        ::fchmod(file.get(), mode) != 0 || ::fsync(file.get()) != 0 ||
         ::link(part.c_str(), path.c_str()) != 0)
         error = errno;
     ::unlink(part.c_str());
@@ -84,13 +77,13 @@ Result<void> write_key_files(const std::filesystem::path& path, const KeyPair& k
 
 Result<KeyPair> read_secret_key_file(const std::filesystem::path& path) {
     // What is checked and what is read must be one file: so both by one descriptor.
-    const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+    const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     struct stat status {};
-    if (file.number < 0 || ::fstat(file.number, &status) != 0)
+    if (!file || ::fstat(file.get(), &status) != 0)
         return bad_input(fmt::format("Cannot open the key file {}: {}.", path.string(), reason(errno)));
     if (const auto is_private = check_private(path, status); !is_private) return is_private.error();
     std::string text(k_max_secret_file_bytes, '\0');
-    const ssize_t size = ::read(file.number, text.data(), text.size());
+    const ssize_t size = ::read(file.get(), text.data(), text.size());
     if (size < 0) return bad_input(fmt::format("Cannot read {}: {}.", path.string(), reason(errno)));
     text.resize(std::size_t(size));
 

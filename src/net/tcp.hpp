@@ -9,25 +9,10 @@
 
 #include <string>
 
+#include "descriptor.hpp"
 #include "pathscope/core/result.hpp"
 
 namespace pathscope {
-
-/// Owns a file descriptor.
-class Descriptor {
-  public:
-    Descriptor() = default;
-    explicit Descriptor(int number) : number_(number) {}
-    Descriptor(Descriptor&& other) noexcept;
-    Descriptor& operator=(Descriptor&& other) noexcept;
-    ~Descriptor();
-
-    [[nodiscard]] int get() const { return number_; }
-    explicit operator bool() const { return number_ >= 0; }
-
-  private:
-    int number_ = -1;
-};
 
 struct TcpAddress {
     sockaddr_storage storage{};

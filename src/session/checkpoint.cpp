@@ -24,7 +24,7 @@ static_assert(std::endian::native == std::endian::little && sizeof(PixelSum) == 
 
 constexpr std::string_view k_magic = "PATHSCKP";
 constexpr std::uint32_t k_version = 1;
-constexpr std::size_t k_seal_bytes = Digest{}.size();
+constexpr std::size_t k_hash_bytes = Digest{}.size();
 constexpr std::size_t k_piece_bytes = (std::size_t{1} << 17) * 8;
 constexpr PackLimits k_header_limits_of_file{16 << 20, 8, 1 << 20};
 constexpr std::uint32_t k_max_missing = 1u << 20;  ///< Rounds under way, and those of servers that were lost.
@@ -228,7 +228,7 @@ Result<CheckpointFile> CheckpointFile::parse(std::string bytes, std::string name
     file.bytes_ = std::move(bytes);
     const std::string_view whole = file.bytes_;
     if (!whole.starts_with(k_magic)) return bad_input(fmt::format("{} is no checkpoint.", file.name_));
-    const std::size_t sealed = whole.size() - std::min(whole.size(), k_seal_bytes);
+    const std::size_t sealed = whole.size() - std::min(whole.size(), k_hash_bytes);
     if (text_of(hash_text(whole.substr(0, sealed))) != whole.substr(sealed))
         return bad_input(fmt::format("{} is damaged or cut off.", file.name_));
 

@@ -103,9 +103,10 @@ void ClientMachine::on(Server& server, message::PieceRequest& message) {
 void ClientMachine::on(Server& server, message::Ready& message) {
     if (message.session != session_ || message.epoch != work_.epoch() || message.state_hash != state_hash_)
         return;
-    if (server.peer.state() == PeerState::syncing)
-        step_peer(server, PeerCause::synced, "It holds state and scene.");
-    servers_changed();
+    const bool joins = server.peer.state() == PeerState::syncing;
+    if (joins) step_peer(server, PeerCause::synced, "It holds state and scene.");
+    // An idle server repeats READY with its heartbeat: only shares by measured speed have a use for that.
+    if (joins || config_.schedule == ScheduleKind::weighted_shares) servers_changed();
 }
 
 /// Only a server that owes no answer sends it. So whatever the client believes it to owe was lost, as with a connection

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "pathscope/net/byte_queue.hpp"
-#include "pathscope/net/token_bucket.hpp"
 
 #include "statistics.hpp"
 #include "testing.hpp"
@@ -192,7 +191,7 @@ TEST_CASE("no span of time sees more than rate times span plus depth, and the ra
             const auto departures = run(stream, {{0, pattern(size, 2)}},
                                         [&] { return TimeNs(draws.next_unit() * double(most_lateness)); });
 
-            const double depth = TokenBucket::depth(rate);
+            const double depth = line_limit(rate).depth;
             for (std::size_t first = 0; first < departures.size(); ++first) {
                 double sent = 0;
                 for (std::size_t last = first; last < std::min(departures.size(), first + 400); ++last) {

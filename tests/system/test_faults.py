@@ -13,6 +13,8 @@ import tempfile
 import time
 import unittest
 
+from processes import cpu_seconds
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 JOB = ["--size", "200x150", "--spp", "96", "--direct-spp", "8", "--seed", "7"]
@@ -56,14 +58,6 @@ class Run:
         if self.process.returncode != 0:
             raise AssertionError(f"exit code {self.process.returncode}: {self.said}")
         return json.loads(self.stats_file.read_text())
-
-
-def cpu_seconds(pid):
-    try:
-        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except (FileNotFoundError, ProcessLookupError):
-        return 0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Faults(unittest.TestCase):

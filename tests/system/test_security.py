@@ -15,6 +15,8 @@ import tempfile
 import time
 import unittest
 
+from processes import cpu_seconds
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 JOB = ["--size", "96x64", "--spp", "32", "--direct-spp", "4", "--seed", "7"]
@@ -299,14 +301,6 @@ class Security(unittest.TestCase):
             self.running.append(client)
             self.check(self.finish(client), joined=0)
             self.assertEqual("Insecure" in client.text(), not keys)
-
-
-def cpu_seconds(pid):
-    try:
-        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except (FileNotFoundError, ProcessLookupError):
-        return 0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@
 
 #include "pathscope/core/clock.hpp"
 #include "pathscope/core/enum_names.hpp"
-#include "pathscope/core/rate_limit.hpp"
+#include "pathscope/core/token_bucket.hpp"
 
 namespace pathscope {
 

@@ -4,7 +4,7 @@
 ///
 ///     chunk i arrives at t_i:   due_i = max(due_(i-1), t_i + delay + jitter u_i),   u_i uniform in [0, 1)
 ///     bytes leave in order, none before it is due, and in any span of length T at most
-///                               rate T + TokenBucket::depth(rate) bytes
+///                               rate T + line_limit(rate).depth bytes
 ///     each byte has one bit, picked at random, flipped with probability p
 ///
 /// Order: the maximum over what came before keeps it, as TCP does: a chunk that is lucky waits for the
@@ -23,6 +23,7 @@
 /// Thread safety: none. No sockets, no clock: `now` is an argument and must not run backwards.
 /// Test: tests/net/test_chaos_stream.cpp
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -30,10 +31,15 @@
 #include <span>
 
 #include "pathscope/core/clock.hpp"
+#include "pathscope/core/token_bucket.hpp"
 #include "pathscope/net/byte_queue.hpp"
-#include "pathscope/net/token_bucket.hpp"
 
 namespace pathscope {
+
+/// The limit of a line of that rate: its depth is what flows in 10 ms, and at least one byte.
+[[nodiscard]] inline RateLimit line_limit(double bytes_per_second) {
+    return {bytes_per_second, std::max(1.0, bytes_per_second * 0.01)};
+}
 
 /// The faults of one direction. By default there are none.
 struct ChaosFaults {

@@ -1,4 +1,4 @@
-#include "pathscope/core/rate_limit.hpp"
+#include "pathscope/core/token_bucket.hpp"
 
 #include "testing.hpp"
 
@@ -23,4 +23,21 @@ TEST_CASE("a token bucket allows a burst, then its rate, and never saves up more
     for (int ms = 0; ms < 10'000; ++ms, now += k_millisecond_ns) allowed += bucket.allow(now);
     CHECK(allowed >= 99);
     CHECK(allowed <= 100);
+}
+
+TEST_CASE("a bucket names the time at which there will be enough, and no limit is none") {
+    TokenBucket bucket({1000, 10}, 0);
+    CHECK(bucket.available(0) == 10);
+    bucket.take(10, 0);
+    CHECK(bucket.available(0) == 0);
+    CHECK(bucket.time_of(5, 0) == 5 * k_millisecond_ns);
+    CHECK(bucket.available(5 * k_millisecond_ns - 1) == 4);
+    CHECK(bucket.available(5 * k_millisecond_ns) == 5);
+    bucket.set_limit({1000, 2}, 5 * k_millisecond_ns);  // What does not fit is gone.
+    CHECK(bucket.available(5 * k_millisecond_ns) == 2);
+
+    TokenBucket open;
+    CHECK(open.available(0) > 1'000'000);
+    open.take(1'000'000, 0);
+    CHECK(open.time_of(1'000'000, 0) == 0);
 }
