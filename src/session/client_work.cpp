@@ -113,9 +113,8 @@ std::optional<ClientMachine::LocalWork> ClientMachine::next_local_work() {
     LocalWork work;
     const auto take_indirect = [&] {
         if (!announced_alone_) return;
-        work.indirect = work_.grant_indirect(k_local_server, now_, [](const Round&, std::uint32_t) {
-            return TimeNs{1} << 61;  // No deadline: if the client is gone, so is the account.
-        });
+        work.indirect = work_.grant_indirect(k_local_server, now_,
+                                             [](const Round&, std::uint32_t) { return k_no_deadline; });
     };
     if (work_.indirect_progress() > work_.direct_progress()) work.direct = work_.grant_direct(now_);
     if (!work.direct) take_indirect();

@@ -26,8 +26,7 @@ struct Log {
 
 /// The moment is far away: all that is to be waited for is the thread.
 void wait_for_write(CheckpointWriter& writer) {
-    while (!writer.due(monotonic_now() + 1000 * k_second_ns))
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!writer.due(monotonic_now() + 1000 * k_second_ns)) std::this_thread::yield();
 }
 
 }  // namespace

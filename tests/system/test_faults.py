@@ -60,6 +60,12 @@ class Run:
         return json.loads(self.stats_file.read_text())
 
 
+def start_server(folder, ports, name):
+    """A server as on another machine: no child of the client."""
+    environment = dict(os.environ, XDG_CACHE_HOME=folder)
+    return subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", name, "--quiet"], env=environment)
+
+
 class Faults(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -97,8 +103,7 @@ class Faults(unittest.TestCase):
         ports = "7665,7666,7667"
         run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
         run.working_servers(1)
-        environment = dict(os.environ, XDG_CACHE_HOME=self.folder)
-        other = subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", "other", "--quiet"], env=environment)
+        other = start_server(self.folder, ports, "other")
         run.wait_until_busy(lambda: [other.pid], 1)
         other.kill()
         other.wait()
@@ -136,8 +141,7 @@ class Faults(unittest.TestCase):
         ports = "7655,7656,7657"
         run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
         run.working_servers(1)
-        environment = dict(os.environ, XDG_CACHE_HOME=self.folder)
-        late = subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", "late", "--quiet"], env=environment)
+        late = start_server(self.folder, ports, "late")
         stats = run.finish()
         late.terminate()
         self.assertEqual(late.wait(timeout=PATIENCE_S), 0)

@@ -98,6 +98,9 @@ struct SampleRange {
 /// Requires: round.index < plan.rounds_of(round.unit).
 [[nodiscard]] SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round);
 
+/// How long the client's own renderer may hold a round: if it is gone, so is the account.
+inline constexpr TimeNs k_no_deadline = TimeNs{1} << 61;
+
 /// A round granted to one server until a deadline.
 struct Lease {
     LeaseId id;

@@ -143,7 +143,8 @@ struct LightTable {
 [[nodiscard]] double light_area(const Light& light);
 
 /// Fewer finite lights are better picked by power: the walk costs more than it gains. With four, the lamps over the plates of
-/// scenes/mis_plates, it pays: variance times processor time is 0.85 of that by power, relative variance 0.89.
+/// scenes/mis_plates, it pays: variance times processor time is 0.85 of that by power, relative variance times
+/// processor time 0.89.
 inline constexpr std::uint32_t k_least_tree_lights = 4;
 
 /// Fills `infinite`, `pick` and the tree. bounds: of each light, or nothing for one at infinity.

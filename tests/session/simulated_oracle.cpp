@@ -1,0 +1,119 @@
+/// What must hold after every event, and at the end: simulated_cluster.hpp.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "simulated_processes.hpp"
+
+namespace pathscope::testing {
+namespace {
+
+/// Without progress though someone could work. Leases that are lost time out one after the other, each later.
+constexpr TimeNs k_longest_wait = 150 * k_second_ns;
+constexpr std::uint64_t k_most_at_once = 100'000;  ///< Events within a millisecond; more, and somebody spins.
+
+}  // namespace
+
+void SimulatedCluster::fail(std::string why) {
+    if (failure_.empty()) failure_ = fmt::format("at {:.6f} s: {}", to_seconds(time_.now()), why);
+}
+
+bool SimulatedCluster::done() const {
+    return client_->machine().complete() && settings_.new_states == 0 && settings_.restarts == 0;
+}
+
+bool SimulatedCluster::someone_can_work() const {
+    if (client_->frozen()) return false;
+    // A client that waits for servers works as soon as one is there; the others carry on alone.
+    const bool waits = client_->machine().progress().waiting;
+    return !waits || std::any_of(servers_.begin(), servers_.end(), [](const auto& server) {
+        return server->runs() && !server->frozen() && !server->parted() && !server->draining();
+    });
+}
+
+void SimulatedCluster::check_all() {
+    const FrameWork& work = client_->machine().work();
+    if (const auto audit = work.indirect_ledger().audit(); !audit) fail(audit.error().message);
+    for (const auto& server : servers_)
+        if (server->machine().leases() > 2 || server->machine().unsent_answers() > 4)
+            fail(fmt::format("a server holds {} leases and {} unsent answers", server->machine().leases(),
+                             server->machine().unsent_answers()));
+    check_progress();
+}
+
+/// A timer that is always due is a process that takes a core and does nothing.
+void SimulatedCluster::check_pace() {
+    if (time_.now() / k_millisecond_ns != millisecond_) {
+        millisecond_ = time_.now() / k_millisecond_ns;
+        events_before_ = totals_.events;
+    }
+    if (totals_.events - events_before_ > k_most_at_once) fail("somebody's timer is due again and again");
+}
+
+void SimulatedCluster::check_progress() {
+    const std::uint64_t committed = client_->machine().work().indirect_ledger().rounds_committed();
+    const bool moved = std::exchange(committed_, committed) != committed;
+    if (moved) check_light();
+    if (moved || done() || client_->machine().complete() || !someone_can_work() || !calm())
+        last_progress_ = time_.now();
+    if (time_.now() - last_progress_ > k_longest_wait)
+        fail(fmt::format("no round was committed for {:.0f} s though somebody could work; {} of {} are",
+                         to_seconds(k_longest_wait), committed,
+                         client_->machine().work().indirect_ledger().rounds()));
+}
+
+/// The indirect light so far is that of the rounds that are committed, and of no other state.
+void SimulatedCluster::check_light() {
+    const FrameWork& work = client_->machine().work();
+    const Ledger& ledger = work.indirect_ledger();
+    const std::uint32_t seed = client_->machine().state().settings.seed;
+    for (std::uint32_t unit = 0; unit < ledger.plan().units; ++unit) {
+        const UnitSnapshot committed = ledger.snapshot(unit);
+        const PixelRect rect = work.rect_of(unit);
+        PixelSum expected;  // Of the block's first pixel: a round has all of its pixels or none.
+        for (std::uint32_t round = 0; round < committed.reached; ++round) {
+            if (std::binary_search(committed.missing.begin(), committed.missing.end(), round)) continue;
+            const SampleRange samples = samples_of_round(ledger.plan(), {unit, round});
+            for (std::uint32_t s = samples.first; s < samples.first + samples.count; ++s)
+                expected += light_of(seed, LightPart::indirect, rect.x, rect.y, s);
+        }
+        if (work.indirect().sum_at(rect.x, rect.y) != expected)
+            return fail(fmt::format("the light of block {} is not that of its committed rounds", unit));
+    }
+}
+
+void SimulatedCluster::check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp) {
+    const RenderSettings& settings = client_->machine().state().settings;
+    for (int y = 0; y < settings.height; ++y)
+        for (int x = 0; x < settings.width; ++x) {
+            PixelSum expected;
+            for (std::uint32_t s = 0; s < spp; ++s) expected += light_of(settings.seed, part, x, y, s);
+            if (sums.sum_at(x, y) != expected)
+                return fail(fmt::format("{} light of pixel ({}, {}) is not that of its samples",
+                                        name_of(part), x, y));
+        }
+}
+
+void SimulatedCluster::check_end() {
+    if (!done()) {
+        if (!someone_can_work()) return;  // Nobody was left, and the client was told to wait for somebody.
+        return fail("the frame is not complete");
+    }
+    const ClientMachine& machine = client_->machine();
+    check_picture(LightPart::indirect, machine.work().indirect(), machine.state().settings.spp);
+    check_picture(LightPart::direct, machine.work().direct(), machine.state().settings.direct_spp);
+    const Digest wanted = state_hash(machine.state());
+    int alive = 0;
+    for (const auto& server : servers_)
+        if (server->runs() && !server->draining()) {
+            ++alive;
+            if (server->machine().working_on() != wanted)
+                fail("a server does not hold the client's state at the end");
+        }
+    if (machine.progress().servers_ready != alive)
+        fail(fmt::format("{} servers are alive at the end, and the client would give work to {}", alive,
+                         machine.progress().servers_ready));
+}
+
+}  // namespace pathscope::testing

@@ -1,0 +1,200 @@
+#pragma once
+/// The processes of a simulated cluster: the real state machines, and a world around each that is made of virtual time and
+/// the cluster's network.
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+#include "pathscope/session/build_identity.hpp"
+
+#include "simulated_cluster.hpp"
+
+namespace pathscope::testing {
+
+/// A process: it runs, or is frozen, and has a timer.
+class Process {
+  public:
+    explicit Process(VirtualTime& time) : time_(time) {}
+    virtual ~Process() = default;
+
+    [[nodiscard]] bool frozen() const { return time_.now() < frozen_until_; }
+    void freeze(TimeNs until) { frozen_until_ = std::max(frozen_until_, until); }
+
+    /// Lets something happen to the process: when it is thawed, and if it still lives.
+    void when_awake(std::function<void()> happens) {
+        if (frozen())
+            return time_.at(frozen_until_,
+                            [this, happens = std::move(happens)] { when_awake(std::move(happens)); });
+        if (!runs_) return;
+        happens();
+        if (runs_) settle();
+    }
+
+    [[nodiscard]] bool runs() const { return runs_; }
+    void kill() { runs_ = false; }
+
+  protected:
+    /// After everything that happens: what is due, and the next timer.
+    void settle() {
+        on_timers();
+        if (!runs_) return;
+        const TimeNs next = std::max(next_timer(), time_.now() + 1);
+        if (planned_ > time_.now() && planned_ <= next) return;
+        planned_ = next;
+        time_.at(next, [this, next] {
+            if (planned_ == next) when_awake([] {});
+        });
+    }
+    virtual void on_timers() = 0;
+    [[nodiscard]] virtual TimeNs next_timer() const = 0;
+
+    VirtualTime& time_;
+
+  private:
+    bool runs_ = true;
+    TimeNs frozen_until_ = 0;
+    TimeNs planned_ = 0;
+};
+
+/// The real machine of a client, in a process of the simulated world.
+class SimulatedCluster::Client : public Process, private ClientWorld {
+  public:
+    Client(SimulatedCluster& cluster, RenderState state, std::uint64_t session)
+        : Process(cluster.time_),
+          cluster_(cluster),
+          renderer_(cluster.time_, cluster.settings_.samples_per_second,
+                    [this](RoundOutcome& outcome) {
+                        when_awake([this, outcome]() mutable { machine_.on_outcome(outcome, time_.now()); });
+                    }),
+          machine_(config(cluster.settings_), {std::move(state), nullptr, SceneDepot()}, session, store_,
+                   *this, cluster.time_.now()) {
+        settle();
+    }
+
+    void receive(const std::string& instance, Channel channel, Frames frames) {
+        machine_.on_message(instance, std::move(frames), channel, time_.now());
+    }
+    void connection_lost() { machine_.on_connection_lost(time_.now()); }
+    void change_state(RenderState state) { machine_.change_state(std::move(state), nullptr, time_.now()); }
+    void pause(TimeNs duration) {
+        freeze(time_.now() + duration);
+        when_awake([this, duration] {
+            if (duration > k_second_ns) machine_.on_own_pause(duration);
+        });
+    }
+
+    [[nodiscard]] const ClientMachine& machine() const { return machine_; }
+    [[nodiscard]] const EventStore& store() const { return store_; }
+
+  private:
+    static ClientConfig config(const ClusterSettings& settings) {
+        ClientConfig config;
+        config.listens = true;
+        config.min_servers = settings.servers > 0 ? settings.min_servers : 0;
+        config.schedule = settings.schedule;
+        config.detector = settings.detector;
+        config.block_size = settings.block;
+        config.round_samples = settings.round_samples;
+        return config;
+    }
+
+    bool send(Channel channel, const std::string& instance, Frames frames) override {
+        return cluster_.to_server(channel, instance, std::move(frames));
+    }
+    void publish(Frames frames) override;
+    void begin(RoundJob job) override { renderer_.begin(std::move(job)); }
+    void cancel_all() override { renderer_.cancel_all(); }
+
+    void on_timers() override { machine_.on_timers(time_.now()); }
+    [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
+
+    SimulatedCluster& cluster_;
+    EventStore store_;
+    SimulatedRenderer renderer_;
+    ClientMachine machine_;
+};
+
+/// The same of a server.
+class SimulatedCluster::Server : public Process, private ServerWorld {
+  public:
+    Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second)
+        : Process(cluster.time_),
+          cluster_(cluster),
+          machine_({fmt::format("server-{}", pid), "0", std::string(build_identity()), 1, pid, "client"},
+                   SceneCache({}), *this),
+          renderer_(cluster.time_, samples_per_second, [this](RoundOutcome& outcome) {
+              when_awake([this, outcome]() mutable { machine_.on_outcome(outcome, time_.now()); });
+          }) {
+        dial();
+    }
+
+    void receive(const std::string& instance, Channel channel, Frames frames) {
+        if (instance == instance_ && machine_.linked())
+            machine_.on_message(std::move(frames), channel, time_.now());
+    }
+    /// SIGTERM.
+    void drain() {
+        if (std::exchange(draining_, true)) return;
+        machine_.drain(time_.now());
+    }
+    void part(TimeNs until) { parted_until_ = std::max(parted_until_, until); }
+    [[nodiscard]] bool parted() const { return time_.now() < parted_until_; }
+    [[nodiscard]] bool draining() const { return draining_; }
+    [[nodiscard]] bool reachable_as(const std::string& instance) const {
+        return runs() && instance == instance_ && machine_.linked();
+    }
+    [[nodiscard]] const std::string& instance() const { return instance_; }
+    [[nodiscard]] const ServerMachine& machine() const { return machine_; }
+
+    Wire from_client[3], from_server[3];
+
+  private:
+    void dial() {
+        instance_ = cluster_.new_instance();
+        const std::string instance = instance_;
+        time_.at(time_.now() + 20 * k_millisecond_ns, [this, instance] {
+            when_awake([this, instance] { machine_.on_linked(instance, time_.now()); });
+        });
+    }
+
+    bool send(Channel channel, Frames frames) override {
+        cluster_.to_client(*this, channel, std::move(frames));
+        return true;
+    }
+    void begin(RoundJob job) override { renderer_.begin(std::move(job)); }
+    void cancel(std::uint64_t ticket) override { renderer_.cancel(ticket); }
+    void cancel_all() override { renderer_.cancel_all(); }
+    void load(RenderState state, Manifest) override {
+        time_.at(time_.now() + 30 * k_millisecond_ns, [this, state = std::move(state)] {
+            when_awake([this, state] {
+                LoadedScene loaded{state, std::make_shared<const Scene>()};
+                machine_.on_loaded(loaded, time_.now());
+            });
+        });
+    }
+
+    void on_timers() override {
+        const bool was_linked = machine_.linked();
+        machine_.on_timers(time_.now());
+        if (draining_ && machine_.linked() && machine_.drained()) machine_.say_goodbye(time_.now());
+        if (machine_.ended() || (draining_ && machine_.drained())) return kill();
+        if (was_linked && !machine_.linked()) dial();
+    }
+    [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
+
+    SimulatedCluster& cluster_;
+    std::string instance_;
+    bool draining_ = false;
+    TimeNs parted_until_ = 0;
+    ServerMachine machine_;
+    SimulatedRenderer renderer_;
+};
+
+inline void SimulatedCluster::Client::publish(Frames frames) {
+    for (const auto& server : cluster_.servers_)
+        (void)cluster_.to_server(Channel::input, server->instance(), frames);
+}
+
+}  // namespace pathscope::testing
