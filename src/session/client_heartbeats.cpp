@@ -2,7 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace pathscope {
+namespace {
+
+/// Looking at a thousand servers takes a fraction of a millisecond: not after every message.
+constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
+constexpr TimeNs k_longest_pause = 50 * k_millisecond_ns;
+
+}  // namespace
 
 void ClientMachine::on(Server& server, message::Ping& message) {
     send(Channel::monitor, server.instance,
@@ -18,6 +27,8 @@ void ClientMachine::on(Server& server, message::Pong& message) {
 
 void ClientMachine::watch_heartbeats() {
     std::vector<std::pair<std::string, std::string>> dead;
+    next_look_ = now_ + k_longest_pause;
+    serve_all_ = true;  // Debts are written off, and rounds become stragglers.
     for (auto& [instance, server] : servers_) {
         if (now_ >= server.next_ping) {
             send(Channel::monitor, instance,
@@ -25,6 +36,7 @@ void ClientMachine::watch_heartbeats() {
                  server.peer.id());
             server.next_ping = now_ + heartbeat_;
         }
+        next_look_ = std::min(next_look_, server.next_ping);
         const Suspicion suspicion = server.detector.assess(now_);
         if (suspicion.state == Liveness::dead)
             dead.emplace_back(instance,
@@ -34,6 +46,7 @@ void ClientMachine::watch_heartbeats() {
                       fmt::format("It has been silent for {:.2f} s.", to_seconds(suspicion.silence)));
         server.credits.write_off(now_);
     }
+    next_look_ = std::max(next_look_, now_ + k_shortest_pause);
     for (const auto& [instance, why] : dead) lose(instance, PeerCause::lost, why);
 }
 
