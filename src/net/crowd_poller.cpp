@@ -31,8 +31,7 @@ int descriptor_of(const Pollable& pollable) {
 Result<CrowdPoller> CrowdPoller::create() {
     const int descriptor = ::epoll_create1(EPOLL_CLOEXEC);
     if (descriptor < 0)
-        return failed(
-            fmt::format("Cannot wait for sockets: {}.", std::generic_category().message(errno)));
+        return failed(fmt::format("Cannot wait for sockets: {}.", std::generic_category().message(errno)));
     return CrowdPoller(descriptor);
 }
 

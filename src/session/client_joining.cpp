@@ -54,6 +54,7 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
                                               FailureDetector(config_.detector, now_)})
                     .first;
         found->second.next_ping = next_look_ = now_;
+        server_by_id_.emplace(id, &found->second);
         store_.name_server(id, hello.name);
         store_.count(Counter::servers_joined, 1, id);
         for (LocalServer& local : local_servers_)
@@ -137,6 +138,7 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
                          cause == PeerCause::lost ? "is lost" : "left", why, open, open == 1 ? "" : "s",
                          open == 1 ? "es" : ""));
     std::erase(asking_, &server);
+    server_by_id_.erase(id);
     servers_.erase(found);
     servers_changed();
 }

@@ -15,7 +15,8 @@ namespace {
 
 constexpr int k_messages_per_turn = 200;  ///< Per socket, so that heartbeats are never starved.
 constexpr TimeNs k_child_watch = 50 * k_millisecond_ns;  ///< How often children are looked at.
-constexpr std::size_t k_wanted_descriptors = 3 * 4096 + 256;  ///< Three connections of each server we may take.
+constexpr std::size_t k_wanted_descriptors =
+    3 * 4096 + 256;                          ///< Three connections of each server we may take.
 constexpr TimeNs k_own_pause = k_second_ns;  ///< A step later than this after the last: we were stopped.
 
 std::uint64_t random_session() {

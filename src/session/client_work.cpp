@@ -99,15 +99,20 @@ bool ClientMachine::grant_to(Server& server) {
     // What it owes comes first, so that counts into the time this round may take.
     const auto duration = [&](const Round& round, std::uint32_t attempts) {
         const double samples = double(round.samples()) * double(server.credits.owed() + 1);
-        return lease_duration(server.speed.predict(samples), attempts);
+        auto predicted = server.speed.predict(samples);
+        if (predicted) *predicted = std::max(*predicted, server.turnaround.mean());
+        return lease_duration(predicted, attempts);
     };
     std::optional<Lease> lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.
         const double samples = double(config_.block_size) * config_.block_size * config_.round_samples;
-        if (const auto estimate = server.speed.predict(samples))
+        if (auto estimate = server.speed.predict(samples)) {
+            // Of its turnaround, a round in front of it took a part.
+            *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(server.credits.limit()));
             if (const auto straggler = pick_straggler(work_.indirect_ledger(), id, now_, *estimate))
                 lease = work_.indirect_ledger().grant_copy(id, *straggler, now_, lease_duration(estimate, 1));
+        }
     }
     if (!lease) return false;
     send_lease(server, *lease);
@@ -212,6 +217,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
 
     const Commit commit = work_.commit(LightPart::indirect, claim, *sums, now_);
     server.speed.add(double(result.samples), render_time);
+    server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
     if (const auto offset = server.clock.at(now_); offset && store_.keeps_events())
@@ -245,10 +251,9 @@ void ClientMachine::count_result(const RoundResult& result, ServerId server) {
 
 void ClientMachine::cancel_superseded(const std::vector<Lease>& leases) {
     for (const Lease& lease : leases)
-        for (auto& [instance, server] : servers_)
-            if (server.peer.id() == lease.server)
-                send(Channel::frames, instance, message::Cancel{session_, lease.epoch, {lease.id.value}},
-                     lease.server);
+        if (const auto holder = server_by_id_.find(lease.server); holder != server_by_id_.end())
+            send(Channel::frames, holder->second->instance,
+                 message::Cancel{session_, lease.epoch, {lease.id.value}}, lease.server);
 }
 
 Progress ClientMachine::progress() const {

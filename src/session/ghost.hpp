@@ -93,7 +93,7 @@ class GhostHost::Ghost : private ServerWorld {
     std::array<std::string, 2> endpoints_;  ///< Of monitor and frames.
     std::uint64_t key_;
     std::optional<Link> link_;
-    std::array<bool, 2> stirred_{};         ///< Monitor, frames: receive until nothing is left.
+    std::array<bool, 2> stirred_{};  ///< Monitor, frames: receive until nothing is left.
     std::optional<RenderState> to_load_;
     ServerMachine machine_;
     ModelledRenderer renderer_;

@@ -35,8 +35,7 @@ Result<std::unique_ptr<GhostHost>> GhostHost::create(GhostConfig config) {
     if (!wake) return wake.error();
     Result<CrowdPoller> poller = CrowdPoller::create();
     if (!poller) return poller.error();
-    return std::unique_ptr<GhostHost>(
-        new GhostHost(std::move(config), std::move(*wake), std::move(*poller)));
+    return std::unique_ptr<GhostHost>(new GhostHost(std::move(config), std::move(*wake), std::move(*poller)));
 }
 
 GhostHost::GhostHost(GhostConfig config, WakePair wake, CrowdPoller poller)
@@ -47,8 +46,7 @@ GhostHost::GhostHost(GhostConfig config, WakePair wake, CrowdPoller poller)
     poller_.add(wake_.pollable(), k_wake_key);
     const std::vector<double> speeds = ghost_speeds(config_.speed, config_.count, config_.seed);
     for (std::size_t i = 0; i < speeds.size(); ++i)
-        ghosts_.push_back(
-            std::make_unique<Ghost>(context_, poller_, config_, int(i) + 1, speeds[i], 2 * i));
+        ghosts_.push_back(std::make_unique<Ghost>(context_, poller_, config_, int(i) + 1, speeds[i], 2 * i));
 }
 
 GhostHost::~GhostHost() = default;

@@ -1,5 +1,9 @@
 #include "pathscope/net/crowd_poller.hpp"
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "net_testing.hpp"
 #include "pathscope/net/context.hpp"
 #include "pathscope/net/dealer.hpp"

@@ -38,8 +38,8 @@ struct ClusterSettings {
     // Of each message, its chance.
     float lose = 0, duplicate = 0, damage = 0;
     double faults_per_second = 0;
-    int new_states = 0;  ///< How often somebody moves the camera.
-    int restarts = 0;    ///< How often the client dies and is started again, from nothing.
+    int new_states = 0;                ///< How often somebody moves the camera.
+    int restarts = 0;                  ///< How often the client dies and is started again, from nothing.
     TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.
 
     [[nodiscard]] static ClusterSettings from_seed(std::uint32_t seed);

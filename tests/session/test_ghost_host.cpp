@@ -52,8 +52,7 @@ class RunningHost {
     RunningHost(const ClientSession& client, int count, double samples_per_second) {
         GhostConfig config;
         for (std::size_t i = 0; i < config.ports.size(); ++i)
-            config.ports[i] =
-                std::stoi(client.endpoints()[i].substr(client.endpoints()[i].rfind(':') + 1));
+            config.ports[i] = std::stoi(client.endpoints()[i].substr(client.endpoints()[i].rfind(':') + 1));
         config.count = count;
         config.speed = {samples_per_second, 0};
         host_ = std::move(*GhostHost::create(config));
@@ -72,7 +71,8 @@ class RunningHost {
 };
 
 bool finish(ClientSession& client) {
-    for (const TimeNs limit = monotonic_now() + k_patience; !client.complete(); client.step(50 * k_millisecond_ns))
+    for (const TimeNs limit = monotonic_now() + k_patience; !client.complete();
+         client.step(50 * k_millisecond_ns))
         if (monotonic_now() > limit) return false;
     return true;
 }
@@ -83,8 +83,9 @@ TEST_CASE("speeds of ghosts are written as they are read, and others are refused
     for (const GhostSpeed& speed : {GhostSpeed{1000, 0}, GhostSpeed{2.5e6, 0.4}, GhostSpeed{1, 2}})
         CHECK(*parse_ghost_speed(to_text(speed)) == speed);
     CHECK(*parse_ghost_speed("2e5,lognormal:0.4") == GhostSpeed{2e5, 0.4});
-    for (const char* bad : {"", "0", "-1", "nan", "1e13", "fast", "1000,", "1000,0.4", "1000,normal:0.4", "1000,lognormal:",
-                            "1000,lognormal:3", "1000,lognormal:-1", "1000 ", ",lognormal:0.4"}) {
+    for (const char* bad :
+         {"", "0", "-1", "nan", "1e13", "fast", "1000,", "1000,0.4", "1000,normal:0.4",
+          "1000,lognormal:", "1000,lognormal:3", "1000,lognormal:-1", "1000 ", ",lognormal:0.4"}) {
         CAPTURE(bad);
         const auto speed = parse_ghost_speed(bad);
         REQUIRE_FALSE(speed);

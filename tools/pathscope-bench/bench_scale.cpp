@@ -25,11 +25,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double k_ghost_speed = 200'000;    ///< Samples per second: a round of a block takes 20 ms.
-constexpr double k_unlimited_speed = 1e12;   ///< Answers at once.
-constexpr double k_sigma = 0.4;              ///< Of the speeds of machines that are not alike.
-constexpr double k_process_speed = 20'000;   ///< Sixteen of them take half of one core.
-constexpr double k_rounds_per_ghost = 32;  ///< Of the crowd.
+constexpr double k_ghost_speed = 200'000;   ///< Samples per second: a round of a block takes 20 ms.
+constexpr double k_unlimited_speed = 1e12;  ///< Answers at once.
+constexpr double k_sigma = 0.4;             ///< Of the speeds of machines that are not alike.
+constexpr double k_process_speed = 20'000;  ///< Sixteen of them take half of one core.
+constexpr double k_rounds_per_ghost = 32;   ///< Of the crowd.
 constexpr std::uint32_t k_speed_seed = 1;
 
 /// A picture in whole blocks, as many as the largest fleet has servers or a multiple, so that equal shares exist.
@@ -102,8 +102,8 @@ std::vector<Case> efficiency_cases(const BenchOptions& options, const std::optio
                 one.fleet = {servers, true, {k_ghost_speed, sigma}, k_speed_seed, 0};
                 one.schedule = schedule;
                 one.config = make_config(schedule);
-                one.job = sized(ghost_job(), k_width, k_height,
-                                one.fleet.samples_per_second() * options.seconds);
+                one.job =
+                    sized(ghost_job(), k_width, k_height, one.fleet.samples_per_second() * options.seconds);
                 cases.push_back(std::move(one));
             }
     if (!scene) return cases;
@@ -171,6 +171,7 @@ Result<Json> measure_crowd(const BenchOptions& options) {
         {"servers", options.ghosts},
         {"block", k_block_size},
         {"tiles", all.front().tiles},
+        {"leases", median_of(all, [](const FrameFigures& f) { return double(f.leases); })},
         {"tiles_per_s", median_of(all, [=](const FrameFigures& f) { return tiles / f.render_s; })},
         {"tiles_per_main_cpu_s", median_of(all, [=](const FrameFigures& f) { return tiles / f.main_cpu_s; })},
         {"tiles_per_cpu_s", median_of(all, [=](const FrameFigures& f) { return tiles / f.process_cpu_s; })},
@@ -217,11 +218,12 @@ void print(const Report& report) {
     table.print();
     if (const Json& crowd = report.extra["crowd"]; !crowd.is_null())
         fmt::print(
-            "{} ghosts: {:.0f} tiles/s, {:.0f} per CPU second of the client's main thread; all joined after {:.2f} s; "
+            "{} ghosts: {} tiles by {:.0f} leases; {:.0f} tiles/s, {:.0f} per CPU second of the client's "
+            "main thread; all joined after {:.2f} s; "
             "{:.0f} KiB of the client's memory each\n",
-            crowd["servers"].get<int>(), crowd["tiles_per_s"].get<double>(),
-            crowd["tiles_per_main_cpu_s"].get<double>(), crowd["join_s"].get<double>(),
-            crowd["client_kib_per_server"].get<double>());
+            crowd["servers"].get<int>(), crowd["tiles"].get<std::uint64_t>(), crowd["leases"].get<double>(),
+            crowd["tiles_per_s"].get<double>(), crowd["tiles_per_main_cpu_s"].get<double>(),
+            crowd["join_s"].get<double>(), crowd["client_kib_per_server"].get<double>());
     if (const Json& one = report.extra["loopback"]; !one.is_null())
         fmt::print("one server over TCP renders {:.3f} ({:.3f} to {:.3f}) of what one process does\n",
                    one["ratio"].get<double>(), one["ratio_min"].get<double>(),
@@ -240,7 +242,8 @@ Result<Report> bench_scale(const BenchOptions& options) {
         scene = std::move(*job);
     }
     Report report;
-    Result<Json> crowd = measure_crowd(options);  // First: the memory of a fresh process is the easiest to tell.
+    Result<Json> crowd =
+        measure_crowd(options);  // First: the memory of a fresh process is the easiest to tell.
     if (!crowd) return crowd.error();
     Result<Json> loopback = measure_loopback(scene, options);
     if (!loopback) return loopback.error();
@@ -248,7 +251,8 @@ Result<Report> bench_scale(const BenchOptions& options) {
     std::vector<Case> cases = efficiency_cases(options, scene);
     for (int run = 0; run <= options.runs; ++run)
         for (std::size_t i = 0; i < cases.size(); ++i) {
-            show_progress(fmt::format("round {} of {}: case {} of {}", run, options.runs, i + 1, cases.size()));
+            show_progress(
+                fmt::format("round {} of {}: case {} of {}", run, options.runs, i + 1, cases.size()));
             const auto figures = render_frame(cases[i].config, cases[i].job, cases[i].fleet);
             if (!figures) return figures.error();
             if (run > 0) cases[i].figures.push_back(*figures);

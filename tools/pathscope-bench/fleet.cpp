@@ -36,7 +36,8 @@ Result<std::vector<ChildProcess>> start(const Fleet& fleet, const ClientSession&
     const auto port = [&](std::size_t i) {
         return client.endpoints()[i].substr(client.endpoints()[i].rfind(':') + 1);
     };
-    std::vector<std::string> arguments{"--quiet", "--ports", fmt::format("{},{},{}", port(0), port(1), port(2))};
+    std::vector<std::string> arguments{"--quiet", "--ports",
+                                       fmt::format("{},{},{}", port(0), port(1), port(2))};
     const auto add = [&](std::initializer_list<std::string> more) {
         arguments.insert(arguments.end(), more);
     };
@@ -73,6 +74,7 @@ Result<void> finish(ClientSession& client, FrameFigures& figures) {
     const RenderSettings& settings = client.state().settings;
     figures.samples = double(settings.width) * double(settings.height) * double(settings.spp);
     figures.tiles = client.work().indirect_ledger().rounds_committed();
+    figures.leases = client.work().indirect_ledger().counts().granted;
     return {};
 }
 
@@ -111,8 +113,8 @@ Result<FrameFigures> render_frame(ClientConfig config, const ClientJob& job, con
     const TimeNs started = monotonic_now();
     const auto processes = start(fleet, **client);
     if (!processes) return processes.error();
-    if (auto ok = step_until(**client, "all servers were ready",
-                             [&] { return !(*client)->progress().waiting; });
+    if (auto ok =
+            step_until(**client, "all servers were ready", [&] { return !(*client)->progress().waiting; });
         !ok)
         return ok.error();
     figures.join_s = to_seconds(monotonic_now() - started);

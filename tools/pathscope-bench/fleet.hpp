@@ -16,21 +16,22 @@ namespace pathscope::bench {
 /// Who serves.
 struct Fleet {
     int servers = 1;
-    bool ghosts = true;           ///< One process of ghosts; else as many processes that render.
-    GhostSpeed speed{};           ///< Of ghosts.
+    bool ghosts = true;  ///< One process of ghosts; else as many processes that render.
+    GhostSpeed speed{};  ///< Of ghosts.
     std::uint32_t speed_seed = 1;
-    double speed_cap = 0;         ///< Of processes that render, in samples per second; 0 = none.
+    double speed_cap = 0;  ///< Of processes that render, in samples per second; 0 = none.
 
     [[nodiscard]] double samples_per_second() const;  ///< Of all together. Requires: not unlimited.
 };
 
 struct FrameFigures {
-    double join_s = 0;    ///< From the start of the servers' processes until all were ready.
-    double render_s = 0;  ///< From then until the frame was complete.
+    double join_s = 0;         ///< From the start of the servers' processes until all were ready.
+    double render_s = 0;       ///< From then until the frame was complete.
     double main_cpu_s = 0;     ///< Processor time of the client's main thread meanwhile.
     double process_cpu_s = 0;  ///< And of its network thread.
     double samples = 0;
     std::uint64_t tiles = 0;
+    std::uint64_t leases = 0;   ///< That were granted for them: more where some were lost, late or copied.
     double kib_per_server = 0;  ///< By which the client's memory grew, until the frame was complete.
 };
 

@@ -59,14 +59,15 @@ int main(int argc, char** argv) {
                  "pathscope-server");
     app.add_option("--connect", config.host, "host of the client (127.0.0.1)")->type_name("HOST");
     add_ports(app, config.ports);
-    CLI::Option* const threads = app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
-        ->check(CLI::Range(0, 1024))
-        ->type_name("N");
+    CLI::Option* const threads =
+        app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
+            ->check(CLI::Range(0, 1024))
+            ->type_name("N");
     add_lever(app, "--bvh", config.tree, "which tree finds hits");
     CLI::Option* const speed_cap = app.add_option("--speed-cap", config.samples_per_second,
-                   "render no faster, in samples per second; 0 = no cap (0)")
-        ->check(CLI::Range(0.0, 1e12))
-        ->type_name("N");
+                                                  "render no faster, in samples per second; 0 = no cap (0)")
+                                       ->check(CLI::Range(0.0, 1e12))
+                                       ->type_name("N");
     app.add_option("--name", config.name, "for people (host name and process id)")
         ->check(CLI::Validator(
             [](const std::string& name) {

@@ -114,6 +114,7 @@ class ClientMachine {
         ClockEstimate clock{};
         Credits credits{0};
         SpeedEstimate speed{};
+        Turnaround turnaround{};
         TimeNs next_ping = 0;
         bool asks = false;  ///< Is in asking_.
 
@@ -199,12 +200,14 @@ class ClientMachine {
 
     std::map<std::string, Server> servers_;  ///< By instance; those that live.
     std::vector<LocalServer> local_servers_;
+    std::map<ServerId, Server*> server_by_id_;
     std::uint32_t last_server_ = 0;
-    TimeNs next_look_ = 0;            ///< When all servers are looked at again.
-    std::vector<Server*> asking_;     ///< Those that spoke since work was handed out: they may have room for more.
-    bool serve_all_ = true;           ///< Others may get something as well.
-    std::uint64_t rounds_open_ = 0;   ///< When work was handed out last.
-    bool tell_schedule_ = true;       ///< Who may be given work has changed.
+    TimeNs next_look_ = 0;  ///< When all servers are looked at again.
+    std::vector<Server*>
+        asking_;             ///< Those that spoke since work was handed out: they may have room for more.
+    bool serve_all_ = true;  ///< Others may get something as well.
+    std::uint64_t rounds_open_ = 0;  ///< When work was handed out last.
+    bool tell_schedule_ = true;      ///< Who may be given work has changed.
     bool reached_min_servers_ = false;
     bool announced_alone_ = false;
     std::map<std::string, TimeNs> who_asked_;  ///< Unknown peers, bounded.
