@@ -106,7 +106,8 @@ void ClientMachine::on(Server& server, message::Ready& message) {
 }
 
 void ClientMachine::on(Server& server, message::Credit& message) {
-    if (message.session == session_) server.credits.set_limit(std::min(message.credits, k_server_credits));
+    if (message.session != session_) return ask_who(server.instance);
+    server.credits.set_limit(std::min(message.credits, k_server_credits));
 }
 
 void ClientMachine::on(Server& server, message::Bye& message) {
