@@ -9,6 +9,7 @@ constexpr TimeNs k_shortest = k_second_ns / 2;
 constexpr TimeNs k_longest_usual = 6 * k_second_ns;
 constexpr TimeNs k_longest = 3600 * k_second_ns;
 constexpr std::uint32_t k_most_doublings = 3;
+constexpr double k_weight_of_newest = 0.25;
 
 }  // namespace
 
@@ -21,6 +22,10 @@ void SpeedEstimate::add(double work, TimeNs duration) {
 std::optional<TimeNs> SpeedEstimate::predict(double work) const {
     if (!measured()) return std::nullopt;
     return from_seconds(std::min(work * seconds_per_work_, to_seconds(k_longest)));
+}
+
+void Turnaround::add(TimeNs since_grant) {
+    mean_ns_ += (mean_ns_ > 0 ? k_weight_of_newest : 1) * (double(since_grant) - mean_ns_);
 }
 
 TimeNs lease_duration(std::optional<TimeNs> predicted, std::uint32_t attempts) {

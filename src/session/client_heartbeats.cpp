@@ -2,12 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace pathscope {
 namespace {
 
 /// The end of a connection is told a moment before, or after, the socket itself knows.
 constexpr int k_probes = 5;
 constexpr TimeNs k_probe_pause = 10 * k_millisecond_ns;
+
+/// Looking at a thousand servers takes a fraction of a millisecond: not after every message.
+constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
+constexpr TimeNs k_longest_pause = 50 * k_millisecond_ns;
 
 }  // namespace
 
@@ -49,11 +55,14 @@ void ClientMachine::probe_connections() {
 
 void ClientMachine::watch_heartbeats() {
     std::vector<std::pair<std::string, std::string>> dead;
+    next_look_ = now_ + k_longest_pause;
+    serve_all_ = true;  // Debts are written off, and rounds become stragglers.
     for (auto& [instance, server] : servers_) {
         if (now_ >= server.next_ping) {
             ping(server);
             server.next_ping = now_ + heartbeat_;
         }
+        next_look_ = std::min(next_look_, server.next_ping);
         const Suspicion suspicion = server.detector.assess(now_);
         if (suspicion.state == Liveness::dead)
             dead.emplace_back(instance,
@@ -63,6 +72,7 @@ void ClientMachine::watch_heartbeats() {
                       fmt::format("It has been silent for {:.2f} s.", to_seconds(suspicion.silence)));
         server.credits.write_off(now_);
     }
+    next_look_ = std::max(next_look_, now_ + k_shortest_pause);
     for (const auto& [instance, why] : dead) lose(instance, PeerCause::lost, why);
 }
 

@@ -58,7 +58,8 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
                     .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
                                               FailureDetector(config_.detector, now_)})
                     .first;
-        found->second.next_ping = now_;
+        found->second.next_ping = next_look_ = now_;
+        server_by_id_.emplace(id, &found->second);
         store_.name_server(id, hello.name);
         store_.count(Counter::servers_joined, 1, id);
         for (LocalServer& local : local_servers_)
@@ -105,7 +106,7 @@ void ClientMachine::on(Server& server, message::Ready& message) {
         return;
     const bool joins = server.peer.state() == PeerState::syncing;
     if (joins) step_peer(server, PeerCause::synced, "It holds state and scene.");
-    // An idle server repeats READY with its heartbeat: only shares by measured speed have a use for that.
+    // An idle server repeats READY with its heartbeat: time to deal anew by what speeds turned out to be.
     if (joins || config_.schedule == ScheduleKind::weighted_shares) servers_changed();
 }
 
@@ -147,6 +148,8 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
     log_note(fmt::format("{} {}: {} {} round{} of it go{} to others.", server.name,
                          cause == PeerCause::lost ? "is lost" : "left", why, open, open == 1 ? "" : "s",
                          open == 1 ? "es" : ""));
+    std::erase(asking_, &server);
+    server_by_id_.erase(id);
     servers_.erase(found);
     servers_changed();
 }

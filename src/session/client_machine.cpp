@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "pathscope/core/log.hpp"
 
@@ -58,7 +59,7 @@ Result<void> ClientMachine::resume(const CheckpointFile& file) {
 void ClientMachine::on_timers(TimeNs now) {
     now_ = now;
     if (probes_left_ > 0 && now_ >= next_probe_) probe_connections();
-    watch_heartbeats();
+    if (now_ >= next_look_) watch_heartbeats();
     work_.indirect_ledger().expire(now_);
     enforce_time_limit();
     hand_out();
@@ -67,8 +68,7 @@ void ClientMachine::on_timers(TimeNs now) {
 TimeNs ClientMachine::next_timer(TimeNs now) const {
     TimeNs next = now + k_second_ns;
     if (probes_left_ > 0) next = std::min(next, next_probe_);
-    for (const auto& [instance, server] : servers_) next = std::min(next, server.next_ping);
-    if (!servers_.empty()) next = std::min(next, now + heartbeat_ / 4);
+    if (!servers_.empty()) next = std::min(next, next_look_);
     if (const auto deadline = work_.indirect_ledger().next_deadline()) next = std::min(next, *deadline);
     if (config_.time_limit > 0 && !stopped_) next = std::min(next, started_ + config_.time_limit);
     return std::max(next, now);
@@ -135,6 +135,7 @@ void ClientMachine::on_message(const std::string& instance, Frames frames, Chann
     }
     if (type_of(*decoded) != MessageType::pong) server->detector.on_traffic(now_);
     if (server->peer.state() == PeerState::suspect) step_peer(*server, PeerCause::heard, "It spoke again.");
+    if (!std::exchange(server->asks, true)) asking_.push_back(server);
     std::visit([&](auto& message) { on(*server, message); }, *decoded);
 }
 

@@ -7,6 +7,7 @@
 
 #include "pathscope/core/log.hpp"
 #include "pathscope/net/dealer.hpp"
+#include "pathscope/net/descriptor_limit.hpp"
 #include "pathscope/net/poller.hpp"
 
 namespace pathscope {
@@ -14,6 +15,8 @@ namespace {
 
 constexpr int k_messages_per_turn = 200;  ///< Per socket, so that heartbeats are never starved.
 constexpr TimeNs k_child_watch = 50 * k_millisecond_ns;  ///< How often children are looked at.
+constexpr std::size_t k_wanted_descriptors =
+    3 * 4096 + 256;                          ///< Three connections of each server we may take.
 constexpr TimeNs k_own_pause = k_second_ns;  ///< A step later than this after the last: we were stopped.
 
 std::uint64_t random_session() {
@@ -51,6 +54,7 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
 ClientSession::~ClientSession() { machine_.say_goodbye(monotonic_now()); }
 
 Result<void> ClientSession::open_sockets() {
+    raise_descriptor_limit(k_wanted_descriptors);
     const auto endpoint = [&](std::size_t channel, bool any_port) {
         return any_port ? fmt::format("tcp://{}:*", config_.host)
                         : fmt::format("tcp://{}:{}", config_.host, config_.ports[channel]);

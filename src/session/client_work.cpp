@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "pathscope/core/log.hpp"
 #include "pathscope/protocol/block_result.hpp"
@@ -11,15 +12,21 @@ namespace pathscope {
 namespace {
 
 constexpr std::size_t k_local_rounds = 2;  ///< One in work, one waiting: no pause between them.
+constexpr TimeNs k_straggler_watch = 10 * k_millisecond_ns;
 constexpr TimeNs k_join_patience =
     20 * k_second_ns;  ///< A local server that has not joined by then is not waited for.
 
 }  // namespace
 
 int ClientMachine::alive_servers() const {
-    return int(std::count_if(servers_.begin(), servers_.end(), [](const auto& entry) {
-        return entry.second.peer.alive() && entry.second.peer.state() != PeerState::draining;
-    }));
+    return int(std::count_if(servers_.begin(), servers_.end(),
+                             [](const auto& entry) { return entry.second.stays(); }));
+}
+
+bool ClientMachine::renders_alone() const {
+    return std::none_of(servers_.begin(), servers_.end(),
+                        [](const auto& entry) { return entry.second.stays(); }) &&
+           !expects_servers();
 }
 
 bool ClientMachine::expects_servers() const {
@@ -32,8 +39,10 @@ bool ClientMachine::expects_servers() const {
                        [](const LocalServer& local) { return !local.joined && !local.ended; });
 }
 
-/// Tells the schedule who may be given work.
-void ClientMachine::servers_changed() {
+/// Tells the schedule who may be given work. Once for all that changed since work was handed out: when a thousand join at
+/// once, each of them asks for it.
+void ClientMachine::tell_schedule() {
+    tell_schedule_ = false;
     std::vector<ServerShare> shares;
     int ready = 0;
     for (const auto& [instance, server] : servers_) {
@@ -57,14 +66,32 @@ void ClientMachine::hand_out() {
         if (alone && last_server_ > 0 && !work_.complete())
             log_note("No server is left; the client carries on alone.");
     }
-    if (config_.min_servers == 0 || reached_min_servers_)
-        for (auto& [instance, server] : servers_) hand_out_to(server);
+    if (tell_schedule_) tell_schedule();
+    if (config_.min_servers == 0 || reached_min_servers_) hand_out_to_servers();
     hand_out_locally();
 }
 
-void ClientMachine::hand_out_to(Server& server) {
-    while (server.peer.accepts_work() && server.credits.available() && grant_to(server)) {
+/// To those that answered; to all only where it may be of use, for there may be thousands.
+void ClientMachine::hand_out_to_servers() {
+    const Ledger& ledger = work_.indirect_ledger();
+    const bool more_rounds = std::exchange(rounds_open_, ledger.rounds_open()) != ledger.rounds_open();
+    bool idle = false;
+    if (std::exchange(serve_all_, false) || more_rounds || !ledger.reopened().empty()) {
+        for (auto& [instance, server] : servers_) idle |= hand_out_to(server);
+    } else {
+        for (Server* const server : asking_) idle |= hand_out_to(*server);
     }
+    for (Server* const server : asking_) server->asks = false;
+    asking_.clear();
+    // Who found nothing to do may soon help a straggler.
+    if (idle && ledger.outstanding() > 0) next_look_ = std::min(next_look_, now_ + k_straggler_watch);
+}
+
+/// Whether it is left with nothing more to do though it could.
+bool ClientMachine::hand_out_to(Server& server) {
+    while (server.peer.accepts_work() && server.credits.available())
+        if (!grant_to(server)) return true;
+    return false;
 }
 
 bool ClientMachine::grant_to(Server& server) {
@@ -72,15 +99,20 @@ bool ClientMachine::grant_to(Server& server) {
     // What it owes comes first, so that counts into the time this round may take.
     const auto duration = [&](const Round& round, std::uint32_t attempts) {
         const double samples = double(round.samples()) * double(server.credits.owed() + 1);
-        return lease_duration(server.speed.predict(samples), attempts);
+        auto predicted = server.speed.predict(samples);
+        if (predicted) *predicted = std::max(*predicted, server.turnaround.mean());
+        return lease_duration(predicted, attempts);
     };
     std::optional<Lease> lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.
         const double samples = double(config_.block_size) * config_.block_size * config_.round_samples;
-        if (const auto estimate = server.speed.predict(samples))
+        if (auto estimate = server.speed.predict(samples)) {
+            // Of its turnaround, a round in front of it took a part.
+            *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(server.credits.limit()));
             if (const auto straggler = pick_straggler(work_.indirect_ledger(), id, now_, *estimate))
                 lease = work_.indirect_ledger().grant_copy(id, *straggler, now_, lease_duration(estimate, 1));
+        }
     }
     if (!lease) return false;
     send_lease(server, *lease);
@@ -188,6 +220,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
 
     const Commit commit = work_.commit(LightPart::indirect, claim, *sums, now_);
     server.speed.add(double(result.samples), render_time);
+    server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
     if (const auto offset = server.clock.at(now_); offset && store_.keeps_events())
@@ -221,10 +254,9 @@ void ClientMachine::count_result(const RoundResult& result, ServerId server) {
 
 void ClientMachine::cancel_superseded(const std::vector<Lease>& leases) {
     for (const Lease& lease : leases)
-        for (auto& [instance, server] : servers_)
-            if (server.peer.id() == lease.server)
-                send(Channel::frames, instance, message::Cancel{session_, lease.epoch, {lease.id.value}},
-                     lease.server);
+        if (const auto holder = server_by_id_.find(lease.server); holder != server_by_id_.end())
+            send(Channel::frames, holder->second->instance,
+                 message::Cancel{session_, lease.epoch, {lease.id.value}}, lease.server);
 }
 
 Progress ClientMachine::progress() const {

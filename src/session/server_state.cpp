@@ -115,9 +115,9 @@ void ServerMachine::on(message::Piece& message) {
 }
 
 void ServerMachine::advance_scene() {
-    if (fetch_->complete()) {
+    if (!world_.reads_files() || fetch_->complete()) {
         if (std::exchange(loading_, true)) return;
-        return world_.load(held_->state, fetch_->manifest());
+        return world_.load(held_->state, world_.reads_files() ? fetch_->manifest() : Manifest{});
     }
     for (Message& request : fetch_->requests(now_)) send_monitor(std::move(request));
 }

@@ -45,3 +45,14 @@ TEST_CASE("speed is measured from results, forgets slowly, and ignores nonsense"
     CHECK(speed.per_second() == doctest::Approx(500).epsilon(1e-4));
     CHECK(*speed.predict(1e300) == 3600 * k_second_ns);
 }
+
+TEST_CASE("a turnaround is a mean that forgets by a quarter each time") {
+    Turnaround turnaround;
+    CHECK(turnaround.mean() == 0);
+    turnaround.add(800);
+    CHECK(turnaround.mean() == 800);
+    turnaround.add(400);
+    CHECK(turnaround.mean() == 700);
+    turnaround.add(0);
+    CHECK(turnaround.mean() == 525);
+}

@@ -17,7 +17,7 @@ PROJECT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(PROJECT / "tools"))
 sys.dont_write_bytecode = True
 
-from performance import bvh_figures, image_figures, limit_figures, plot  # noqa: E402
+from performance import bvh_figures, image_figures, limit_figures, plot, scale_figures  # noqa: E402
 from performance.equal_error import Need, common_error, need, ratio  # noqa: E402
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -60,6 +60,19 @@ def limits_file(gflops=100.0, gb_per_s=(64.0, 8.0), ns=(2.0, 80.0)):
     for i, size in enumerate((32768, 131072)):
         rows += [{"limit": "bandwidth", "bytes": size, "gb_per_s": gb_per_s[i]}, {"limit": "latency", "bytes": size, "ns": ns[i]}]
     return {**FILE, "bench": "limits", "simd": "avx2", "rows": rows}
+
+
+def scale_row(servers, schedule, speeds, efficiency, kind="ghosts"):
+    return {"servers": servers, "schedule": schedule, "speeds": speeds, "kind": kind, "efficiency": efficiency,
+            "efficiency_min": 0.9 * efficiency, "efficiency_max": min(1.0, 1.1 * efficiency), "s": 2.0}
+
+
+SCALE_ROWS = [scale_row(servers, schedule, speeds, 1.0 if schedule == "pull" or speeds == "equal" else 1 / servers)
+              for servers in (1, 2, 4) for schedule in ("pull", "static") for speeds in ("equal", "lognormal")]
+
+
+def scale_file(crowd=None, loopback=None):
+    return {**FILE, "bench": "scale", "rows": SCALE_ROWS, "crowd": crowd, "loopback": loopback}
 
 
 class EqualError(unittest.TestCase):
@@ -241,6 +254,21 @@ class Pictures(unittest.TestCase):
         self.assertEqual([picture.name for picture in drawn], ["bvh-steps.svg"])
 
 
+    def test_scale(self):
+        picture, = scale_figures.pictures(SCALE_ROWS + [scale_row(2, "pull", "equal", 0.9, "processes")])
+        places = markers(picture)
+        self.assertEqual(len(places), 3 + 3 + 2 + 1)  # By their hints: those of both panels that are alike count once.
+        self.assertLess(places["2 servers, processes: 0.900"][0], places["2 servers, static: 0.500"][0])  # The left panel, and the right one.
+        falls = [places[f"{servers} servers, static: {1 / servers:.3f}"][1] for servers in (2, 4)]
+        self.assertGreater(falls[1], falls[0])
+        self.assertEqual(words(picture).count("efficiency"), 2)
+        self.assertIn("0.25 with static and lognormal speeds", picture.alt)
+        for rows in (SCALE_ROWS[:1], [row for row in SCALE_ROWS if row["speeds"] == "equal"]):
+            picture, = scale_figures.pictures(rows)
+            height = float(parse(picture).get("height"))
+            self.assertTrue(all(0 < x < plot.WIDTH and 0 < y < height for x, y in markers(picture).values()))
+
+
 class Floors(unittest.TestCase):
     def row(self, triangles=38, **changes):
         return {**bvh_row("box", "shadow", "wide", 5, 3, None), "triangles": triangles, "boxes_per_ray": 16.0, "triangles_per_ray": 8.0, **changes}
@@ -311,6 +339,18 @@ class Page(unittest.TestCase):
         self.assertIn("| box & <ball> | 0.25 | 16.0 | 4.0 | 0.25 | 4 | 1 | 0.25 |", after)
         sections = re.compile(r"(<!-- figures: (?:bvh|image) -->\n).*?(<!-- end -->)", re.DOTALL)
         self.assertEqual(sections.sub(r"\1\2", after), sections.sub(r"\1\2", before))
+
+    def test_scale_with_and_without_its_parts(self):
+        crowd = {"servers": 1000, "tiles": 32000, "tiles_per_s": 15000.0, "tiles_per_main_cpu_s": 20000.0, "tiles_per_cpu_s": 12000.0,
+                 "join_s": 1.5, "client_kib_per_server": 120.0}
+        loopback = {"ratio": 0.98, "ratio_min": 0.95, "ratio_max": 1.01}
+        for file, told in ((scale_file(), []), (scale_file(crowd), ["| 32,000 | 15,000 | 20,000 | 12,000 | 1.50 | 120 |"]),
+                           (scale_file(crowd, loopback), ["0.980 (0.950 to 1.010)"])):
+            done = self.write(file)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            page = self.page.read_text(encoding="utf-8")
+            for words_told in ["| 4 | ghosts | static | lognormal | 0.250 | 0.225 | 0.275 | 2.00 |", "(images/scale-efficiency.svg)", *told]:
+                self.assertIn(words_told, page)
 
     def test_limits_beside_the_rays_that_they_bound(self):
         bvh = bvh_file([bvh_row("box", "shadow", "wide", 5, 3, None)])

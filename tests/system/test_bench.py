@@ -6,6 +6,7 @@ No figure is judged for speed: how fast a machine is depends on who else uses it
 """
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -126,6 +127,34 @@ class Bench(unittest.TestCase):
         rows = self.measure("ledger")["rows"]
         self.assertEqual({row["schedule"] for row in rows}, {"static", "weighted", "pull"})
         self.assertTrue(all(row["servers"] == 1000 and row["tiles_per_s"] > 0 for row in rows))
+
+    def test_scale(self):
+        # The program itself checks nothing; but a frame that lost a tile would never be complete.
+        file = self.measure("scale", "--servers", "1,3", "--ghosts", 40, "--seconds", 0.1, "--scene", "scenes/cornell", "--spp", 1)
+        rows = file["rows"]
+        cases = [(row["servers"], row["kind"], row["schedule"], row["speeds"]) for row in rows]
+        self.assertEqual(cases, [(n, "ghosts", schedule, speeds) for n in (1, 3) for schedule in ("pull", "static") for speeds in ("equal", "lognormal")] +
+                         [(n, "processes", "pull", "equal") for n in (1, 3)])
+        for row in rows:
+            self.assertLessEqual(row["efficiency_min"], row["efficiency"], row)
+            self.assertLessEqual(row["efficiency"], row["efficiency_max"], row)
+            self.assertTrue(0 < row["efficiency_max"] < 1.1, row)  # Nobody is faster than its speed, but for a moment at the start.
+            self.assertGreaterEqual(row["tiles"], 32, row)
+        equal = [row["sum_of_speeds"] for row in rows if (row["kind"], row["speeds"]) == ("ghosts", "equal")]
+        self.assertEqual(equal, [200e3, 200e3, 600e3, 600e3])
+        crowd = file["crowd"]
+        self.assertEqual((crowd["servers"], crowd["tiles"]), (40, 60 * 34))  # A round for each block of full HD: more than 32 for each ghost.
+        self.assertTrue(all(crowd[key] > 0 for key in ("tiles_per_s", "tiles_per_main_cpu_s", "tiles_per_cpu_s", "join_s")), crowd)
+        self.assertLessEqual(crowd["tiles_per_cpu_s"], crowd["tiles_per_main_cpu_s"])
+        loopback = file["loopback"]
+        self.assertTrue(0 < loopback["ratio_min"] <= loopback["ratio"] <= loopback["ratio_max"], loopback)
+
+    def test_too_few_files_for_ghosts(self):
+        few = lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))  # noqa: E731
+        done = subprocess.run([BIN / "pathscope-server", "--ghost", "1000"], capture_output=True, text=True, timeout=PATIENCE_S, preexec_fn=few)
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(len(done.stderr.strip().splitlines()), 1)
+        self.assertIn("open files", done.stderr)
 
     def test_refused(self):
         for words, named in ((["race"], "bvh"), (["bvh"], "--scenes"), (["bvh", "--scene", "nowhere"], "nowhere"),

@@ -30,6 +30,10 @@ struct BenchOptions {
     TreeKind tree = TreeKind::wide;
     std::string kind = "incoherent";  ///< Of rays: ray_sets.hpp.
     int passes = 1;
+    std::vector<int> servers{1, 2, 4, 8, 16};  ///< How many, for each row of `scale`.
+    int ghosts = 1000;                         ///< In its crowd.
+    double seconds = 2;                        ///< That one of its frames takes at least.
+    std::uint32_t crowd_spp = 64;
 };
 
 /// What goes into the JSON beside machine and commit.
@@ -54,6 +58,7 @@ struct Bench {
 [[nodiscard]] Result<Report> bench_image(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_ledger(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_limits(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_scale(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_trace(const BenchOptions& options);
 
 /// {"bench", "machine", "commit", "version", "runs", "rows", ...}, as docs/performance.md explains them.

@@ -6,18 +6,52 @@
 
 #include "../common/arguments.hpp"
 #include "pathscope/core/log.hpp"
+#include "pathscope/session/ghost_host.hpp"
 #include "pathscope/session/server_session.hpp"
 
 namespace {
-std::atomic<pathscope::ServerSession*> g_session{nullptr};
+
+using namespace pathscope;
+
+template <class Session>
+std::atomic<Session*> g_running{nullptr};
+
+template <class Session>
 void stop(int) {
-    if (pathscope::ServerSession* session = g_session.load()) session->request_stop();
+    if (Session* session = g_running<Session>.load()) session->request_stop();
 }
+
+/// Until a signal or the client ends it.
+template <class Session>
+int run(const Result<std::unique_ptr<Session>>& session) {
+    if (!session) return report("pathscope-server", session.error());
+    g_running<Session>.store(session->get());
+    std::signal(SIGINT, stop<Session>);
+    std::signal(SIGTERM, stop<Session>);
+    const auto done = (*session)->run();
+    g_running<Session>.store(nullptr);
+    return done ? 0 : report("pathscope-server", done.error());
+}
+
+CLI::Option* add_ghost_speed(CLI::App& app, GhostSpeed& speed) {
+    const auto assign = [&speed](const std::string& text) {
+        const auto parsed = parse_ghost_speed(text);
+        if (!parsed) throw CLI::ValidationError("--ghost-speed", parsed.error().message);
+        speed = *parsed;
+    };
+    return app
+        .add_option_function<std::string>(
+            "--ghost-speed", assign,
+            "of each ghost, all alike or lognormal around that median (" + to_text(speed) + ")")
+        ->type_name("SAMPLES_PER_S[,lognormal:SIGMA]");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    using namespace pathscope;
     ServerConfig config;
+    GhostConfig ghosts;
+    ghosts.count = 0;
     config.cache_folder = SceneCache::default_folder();
     std::string mesh_cache;
     std::string key_file, client_key;
@@ -26,14 +60,15 @@ int main(int argc, char** argv) {
                  "pathscope-server");
     app.add_option("--connect", config.host, "host of the client (127.0.0.1)")->type_name("HOST");
     add_ports(app, config.ports);
-    app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
-        ->check(CLI::Range(0, 1024))
-        ->type_name("N");
+    CLI::Option* const threads =
+        app.add_option("--threads", config.threads, "threads that render; 0 = all cores (0)")
+            ->check(CLI::Range(0, 1024))
+            ->type_name("N");
     add_lever(app, "--bvh", config.tree, "which tree finds hits");
-    app.add_option("--speed-cap", config.samples_per_second,
-                   "render no faster, in samples per second; 0 = no cap (0)")
-        ->check(CLI::Range(0.0, 1e12))
-        ->type_name("N");
+    CLI::Option* const speed_cap = app.add_option("--speed-cap", config.samples_per_second,
+                                                  "render no faster, in samples per second; 0 = no cap (0)")
+                                       ->check(CLI::Range(0.0, 1e12))
+                                       ->type_name("N");
     app.add_option("--name", config.name, "for people (host name and process id)")
         ->check(CLI::Validator(
             [](const std::string& name) {
@@ -53,6 +88,16 @@ int main(int argc, char** argv) {
     key->needs(of_client);
     of_client->needs(key);
     add_keygen(app);
+    CLI::Option* const ghost =
+        app.add_option("--ghost", ghosts.count,
+                       "be N servers that render nothing and answer with noise in a modelled time: for "
+                       "measuring the client; 0 = a real server (0)")
+            ->check(CLI::Range(1, GhostHost::k_most_ghosts))
+            ->excludes(threads)
+            ->excludes(speed_cap)
+            ->type_name("N");
+    add_ghost_speed(app, ghosts.speed)->needs(ghost);
+    app.add_option("--ghost-seed", ghosts.seed, "of the ghosts' speeds (1)")->needs(ghost)->type_name("N");
     app.add_flag("--quiet", quiet, "say only what is wrong");
     const auto text = parse_arguments(app, argc, argv);
     if (!text) return report("pathscope-server", text.error());
@@ -74,12 +119,9 @@ int main(int argc, char** argv) {
                 std::fprintf(stderr, "warning: %.*s\n", int(sentence.size()), sentence.data());
         });
 
-    const auto session = ServerSession::create(config);
-    if (!session) return report("pathscope-server", session.error());
-    g_session.store(session->get());
-    std::signal(SIGINT, stop);
-    std::signal(SIGTERM, stop);
-    const auto done = (*session)->run();
-    g_session.store(nullptr);
-    return done ? 0 : report("pathscope-server", done.error());
+    if (ghosts.count == 0) return run(ServerSession::create(config));
+    ghosts.host = config.host;
+    ghosts.ports = config.ports;
+    if (!config.name.empty()) ghosts.name = config.name;
+    return run(GhostHost::create(ghosts));
 }

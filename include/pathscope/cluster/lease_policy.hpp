@@ -32,8 +32,19 @@ class SpeedEstimate {
     [[nodiscard]] std::optional<TimeNs> predict(double work) const;
 
   private:
-    static constexpr double k_weight_of_newest = 0.25;
     double seconds_per_work_ = 0;
+};
+
+/// How long a server's leases take from grant to result, as a mean of the same weights. Beside rendering there is the
+/// wire, and there are queues at both ends: with a thousand servers, results wait for a client that has its hands full,
+/// and a lease that ended meanwhile would bring it the same work again.
+class Turnaround {
+  public:
+    void add(TimeNs since_grant);
+    [[nodiscard]] TimeNs mean() const { return TimeNs(mean_ns_); }  ///< 0 until measured.
+
+  private:
+    double mean_ns_ = 0;
 };
 
 /// predicted: nothing = not known, then the usual upper end. A server works its leases off one after the

@@ -126,7 +126,11 @@ class ClientMachine {
         ClockEstimate clock{};
         Credits credits{0};
         SpeedEstimate speed{};
+        Turnaround turnaround{};
         TimeNs next_ping = 0;
+        bool asks = false;  ///< Is in asking_.
+
+        [[nodiscard]] bool stays() const { return peer.alive() && peer.state() != PeerState::draining; }
     };
     /// A round of the client's own renderer: one part of it, or both.
     struct LocalWork {
@@ -182,10 +186,12 @@ class ClientMachine {
     void on(Server& server, message::Nack& message);
     [[nodiscard]] int alive_servers() const;
     [[nodiscard]] bool expects_servers() const;
-    [[nodiscard]] bool renders_alone() const { return alive_servers() == 0 && !expects_servers(); }
-    void servers_changed();
+    [[nodiscard]] bool renders_alone() const;
+    void servers_changed() { tell_schedule_ = serve_all_ = true; }
+    void tell_schedule();
     void hand_out();
-    void hand_out_to(Server& server);
+    void hand_out_to_servers();
+    bool hand_out_to(Server& server);
     bool grant_to(Server& server);
     void send_lease(Server& server, const Lease& lease);
     [[nodiscard]] std::optional<LocalWork> next_local_work();
@@ -209,7 +215,14 @@ class ClientMachine {
 
     std::map<std::string, Server> servers_;  ///< By instance; those that live.
     std::vector<LocalServer> local_servers_;
+    std::map<ServerId, Server*> server_by_id_;
     std::uint32_t last_server_ = 0;
+    TimeNs next_look_ = 0;  ///< When all servers are looked at again.
+    std::vector<Server*>
+        asking_;             ///< Those that spoke since work was handed out: they may have room for more.
+    bool serve_all_ = true;  ///< Others may get something as well.
+    std::uint64_t rounds_open_ = 0;  ///< When work was handed out last.
+    bool tell_schedule_ = true;      ///< Who may be given work has changed.
     bool reached_min_servers_ = false;
     bool announced_alone_ = false;
     std::map<std::string, TimeNs> who_asked_;  ///< Unknown peers, bounded.

@@ -56,6 +56,8 @@ class ServerWorld {
 
     /// Begins to load a scene whose files are in the cache; it comes back by on_loaded(). One at a time.
     virtual void load(RenderState state, Manifest manifest) = 0;
+    /// Whether load() reads files. If not, none are fetched, and its manifest is empty.
+    [[nodiscard]] virtual bool reads_files() const { return true; }
 };
 
 class ServerMachine {

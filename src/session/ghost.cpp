@@ -1,0 +1,199 @@
+#include "ghost.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "channel_options.hpp"
+#include "pathscope/math/random.hpp"
+#include "pathscope/session/build_identity.hpp"
+
+namespace pathscope {
+namespace {
+
+/// Light that looks like light to everything that handles it: 32 bits in each channel of each pixel, as sums of a few
+/// samples at the default quantum have; half of each number is then zeros, and a tile packs to half its size.
+const std::vector<PixelSum>& noise() {
+    static const std::vector<PixelSum> sums = [] {
+        std::vector<PixelSum> made(std::size_t{1} << 14);
+        HashRng rng(1);
+        for (PixelSum& sum : made) sum = {rng.next_u32(), rng.next_u32(), rng.next_u32()};
+        return made;
+    }();
+    return sums;
+}
+
+std::vector<PixelSum> sums_of(const Round& round) {
+    const std::vector<PixelSum>& all = noise();
+    std::size_t at = hash_combine(hash_u32(round.block), round.first) % all.size();
+    std::vector<PixelSum> sums;
+    std::size_t left = std::size_t(round.rect.area());
+    sums.reserve(left);
+    for (; left > 0; at = 0) {
+        const std::size_t piece = std::min(left, all.size() - at);
+        sums.insert(sums.end(), all.begin() + std::ptrdiff_t(at), all.begin() + std::ptrdiff_t(at + piece));
+        left -= piece;
+    }
+    return sums;
+}
+
+std::shared_ptr<const Scene> no_scene() {
+    static const auto scene = std::make_shared<const Scene>();
+    return scene;
+}
+
+}  // namespace
+
+// ---- The renderer.
+
+void ModelledRenderer::begin(const RoundJob& job, TimeNs now) {
+    const TimeNs started = std::max(now, free_at_);
+    const TimeNs duration = from_seconds(double(job.round.samples()) / samples_per_second_);
+    free_at_ = started + std::max<TimeNs>(1, duration);
+    queue_.push_back({job.ticket, job.part, job.round, started, free_at_});
+}
+
+void ModelledRenderer::cancel(std::uint64_t ticket) {
+    for (Queued& queued : queue_) queued.cancelled |= queued.ticket == ticket;
+}
+
+void ModelledRenderer::cancel_all() {
+    for (Queued& queued : queue_) queued.cancelled = true;
+}
+
+std::optional<TimeNs> ModelledRenderer::next() const {
+    const bool any_cancelled =
+        std::any_of(queue_.begin(), queue_.end(), [](const Queued& queued) { return queued.cancelled; });
+    if (any_cancelled) return 0;
+    return queue_.empty() ? std::nullopt : std::optional(queue_.front().done);
+}
+
+RoundOutcome ModelledRenderer::take(TimeNs now) {
+    const auto cancelled =
+        std::find_if(queue_.begin(), queue_.end(), [](const Queued& queued) { return queued.cancelled; });
+    if (cancelled != queue_.end()) {
+        // The time that it would still have taken is there for those behind it.
+        const TimeNs saved = cancelled->done - std::clamp(now, cancelled->started, cancelled->done);
+        for (auto behind = std::next(cancelled); behind != queue_.end(); ++behind) {
+            behind->started -= saved;
+            behind->done -= saved;
+        }
+        free_at_ -= saved;
+        cancelled->done -= saved;
+        const RoundOutcome outcome = outcome_of(*cancelled);
+        queue_.erase(cancelled);
+        return outcome;
+    }
+    CHECK(!queue_.empty() && queue_.front().done <= now, queue_.size());
+    RoundOutcome outcome = outcome_of(queue_.front());
+    queue_.pop_front();
+    RoundResult result;
+    result.sums = sums_of(outcome.round);
+    result.samples = result.rays = outcome.round.samples();
+    outcome.result = std::move(result);
+    return outcome;
+}
+
+RoundOutcome ModelledRenderer::outcome_of(const Queued& queued) {
+    RoundOutcome outcome;
+    outcome.ticket = queued.ticket;
+    outcome.part = queued.part;
+    outcome.round = queued.round;
+    outcome.started = queued.started;
+    outcome.duration = queued.done - queued.started;
+    return outcome;
+}
+
+// ---- The ghost.
+
+GhostHost::Ghost::Ghost(const Context& context, CrowdPoller& poller, const GhostConfig& config, int number,
+                        double samples_per_second, std::uint64_t key)
+    : context_(context),
+      poller_(poller),
+      endpoints_{fmt::format("tcp://{}:{}", config.host, config.ports[1]),
+                 fmt::format("tcp://{}:{}", config.host, config.ports[2])},
+      key_(key),
+      machine_({fmt::format("{}-{}", config.name, number), program_version(), build_identity(), 1,
+                std::uint32_t(::getpid()), config.host},
+               SceneCache({}), *this),
+      renderer_(samples_per_second) {}
+
+GhostHost::Ghost::~Ghost() { unlink(); }
+
+void GhostHost::Ghost::unlink() {
+    if (!link_) return;
+    poller_.remove(link_->monitor.pollable());
+    poller_.remove(link_->frames.pollable());
+    link_.reset();
+}
+
+Result<void> GhostHost::Ghost::dial() {
+    unlink();
+    const std::string instance = random_routing_id();
+    auto monitor =
+        DealerSocket::connect(context_, endpoints_[0], instance, channel_options(Channel::monitor));
+    if (!monitor) return monitor.error();
+    auto frames = DealerSocket::connect(context_, endpoints_[1], instance, channel_options(Channel::frames));
+    if (!frames) return frames.error();
+    link_.emplace(Link{std::move(*monitor), std::move(*frames)});
+    poller_.add(link_->monitor.pollable(), key_);
+    poller_.add(link_->frames.pollable(), key_ + 1);
+    stirred_ = {true, true};
+    machine_.on_linked(instance, monotonic_now());
+    return {};
+}
+
+void GhostHost::Ghost::tend() {
+    receive_all();
+    do work();
+    while (machine_.linked() && !machine_.ended() && (receive_all() || to_load_));
+}
+
+/// Outcomes, and what is due.
+void GhostHost::Ghost::work() {
+    const TimeNs now = monotonic_now();
+    if (auto state = std::exchange(to_load_, std::nullopt)) {
+        LoadedScene loaded{std::move(*state), no_scene()};
+        machine_.on_loaded(loaded, now);
+    }
+    while (renderer_.next().value_or(now + 1) <= now) {
+        RoundOutcome outcome = renderer_.take(now);
+        machine_.on_outcome(outcome, now);
+    }
+    machine_.on_timers(now);
+}
+
+TimeNs GhostHost::Ghost::next_timer(TimeNs now) const {
+    return std::min(machine_.next_timer(now), renderer_.next().value_or(now + k_second_ns));
+}
+
+/// From the sockets that stirred. Whether anything was there.
+bool GhostHost::Ghost::receive_all() {
+    const bool told = std::exchange(stirred_[0], false) && receive(link_->monitor, Channel::monitor);
+    const bool leased = std::exchange(stirred_[1], false) && receive(link_->frames, Channel::frames);
+    return told || leased;
+}
+
+bool GhostHost::Ghost::receive(DealerSocket& socket, Channel channel) {
+    bool any = false;
+    for (; auto frames = socket.receive(); any = true)
+        machine_.on_message(std::move(*frames), channel, monotonic_now());
+    return any;
+}
+
+void GhostHost::Ghost::leave() {
+    machine_.drain(monotonic_now());
+    renderer_.cancel_all();
+    work();
+    if (machine_.linked()) machine_.say_goodbye(monotonic_now());
+}
+
+bool GhostHost::Ghost::send(Channel channel, Frames frames) {
+    DealerSocket& socket = channel == Channel::monitor ? link_->monitor : link_->frames;
+    const bool left = socket.send(std::move(frames)) == SendOutcome::delivered;
+    stir(channel);  // Even if it did not leave: the attempt may have taken in news of what arrived.
+    return left;
+}
+
+}  // namespace pathscope
