@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
 
 #include "lookup.hpp"
@@ -228,6 +229,14 @@ void measure_brightness(Scene& scene) {
     scene.brightest_radiance = max_component(max(typical, max(surfaces, infinity)));
 }
 
+/// A sun of next to no width, or several lights near the end of floats, may be brighter than any float.
+Result<void> check_brightness(const Scene& scene) {
+    if (std::isfinite(scene.typical_radiance) && std::isfinite(scene.brightest_radiance)) return {};
+    return bad_input(
+        "The lights of the scene are brighter than light can be computed in; make them darker, or the sun "
+        "wider.");
+}
+
 }  // namespace
 
 Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBuild& build) {
@@ -257,6 +266,7 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBui
         if (auto added = std::visit(AddLight{file, parts, scene.lights}, light); !added) return added.error();
     finish_light_table(scene.lights, scene_radius(scene), light_bounds(scene));
     measure_brightness(scene);
+    if (auto fits = check_brightness(scene); !fits) return fits.error();
     if (scene.lights.empty()) log_warning("The scene has no light: the image will be black.");
     return scene;
 }

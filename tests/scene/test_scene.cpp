@@ -1,3 +1,5 @@
+#include <limits>
+
 #include "pathscope/math/random.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "small_scenes.hpp"
@@ -163,6 +165,20 @@ TEST_CASE("what cannot be computed with is refused in a sentence") {
     const auto huge = make_scene(file, empty_parts(), {.threads = 1});
     REQUIRE_FALSE(huge);
     CHECK(huge.error().message.find("scale it down") != std::string::npos);
+
+    // Each of these numbers is a float; what follows from them is none: a disc too narrow, two skies on each other.
+    constexpr float k_most = std::numeric_limits<float>::max();
+    const std::vector<std::vector<LightSpec>> too_bright{
+        {SunSpec{{0, 1, 0}, {k_most, 0, 0}, 0.53f}},
+        {SunSpec{{0, 1, 0}, k_white, 1e-18f}},
+        {SkySpec{{0, k_most, 0}}, SkySpec{{0, k_most, 0}}},
+    };
+    for (const std::vector<LightSpec>& lights : too_bright) {
+        file.lights = lights;
+        const auto glaring = make_scene(file, empty_parts(), {.threads = 1});
+        REQUIRE_FALSE(glaring);
+        CHECK(glaring.error().message.find("make them darker") != std::string::npos);
+    }
 
     file.lights = {EnvmapSpec{"night.hdr", 1, 0}};
     SceneParts parts = empty_parts();
