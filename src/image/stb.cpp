@@ -75,6 +75,24 @@ Error broken(std::string_view name) {
         fmt::format("{}: the picture is broken ({}).", name, reason ? reason : "no reason given"));
 }
 
+/// What a format can do at most, of one colour all over: .png one bit per pixel, deflated by 1032; .jpg one bit per 8 x 8
+/// pixels; .bmp one bit per pixel; .hdr and .tga runs of 127 and 128.
+std::size_t most_pixels_per_byte(std::string_view bytes) {
+    if (bytes.starts_with("\x89PNG")) return 8 * 1032;
+    if (bytes.starts_with("\xff\xd8\xff")) return 8 * 64;
+    if (bytes.starts_with("BM")) return 8;
+    return is_rgbe(bytes) ? 16 : 64;
+}
+
+/// The decoders of .tga and .hdr take zeros for what is missing: twenty bytes would become a picture of any size.
+Result<void> check_enough_bytes(const PictureInfo& info, std::string_view bytes, std::string_view name) {
+    const std::size_t pixels = std::size_t(info.width) * std::size_t(info.height);
+    if (pixels / most_pixels_per_byte(bytes) <= bytes.size()) return {};
+    return bad_input(
+        fmt::format("{}: says it has {}x{} pixels, which its {} bytes cannot hold; it is cut short.", name,
+                    info.width, info.height, bytes.size()));
+}
+
 /// Size and channels, and a budget on this thread for decoding that much. Per pixel: 16 bytes of result, and the same
 /// three times over for what decoders hold meanwhile; per byte of the file: gathering it from its pieces.
 Result<PictureInfo> prepare(std::string_view bytes, std::string_view name) {
@@ -86,6 +104,7 @@ Result<PictureInfo> prepare(std::string_view bytes, std::string_view name) {
     if (!stbi_info_from_memory(data_of(bytes), int(bytes.size()), &info.width, &info.height, &info.channels))
         return broken(name);
     if (const auto size = check_picture_size(info.width, info.height, name); !size) return size.error();
+    if (const auto whole = check_enough_bytes(info, bytes, name); !whole) return whole.error();
     t_budget_bytes = k_bytes_at_least + k_bytes_per_file_byte * bytes.size() +
                      k_bytes_per_pixel * std::size_t(info.width) * std::size_t(info.height);
     return info;

@@ -5,6 +5,8 @@
 ///
 /// What the client sends must be a message that a server decodes. Every round that it begins has one outcome.
 
+#include <set>
+
 #include "../session/simulated_renderer.hpp"
 #include "forged_message.hpp"
 #include "fuzz_target.hpp"
@@ -290,9 +292,15 @@ class ClientScript : private ClientWorld {
         now_ += pause;
         machine_.on_own_pause(pause);
     }
+    /// Each process that was begun ends once.
     void process() {
-        const std::uint32_t pid = in_.byte();
-        if (in_.flag()) return machine_.expect_server(pid, "peer");
+        const std::uint32_t pid = 1 + std::uint32_t(in_.below(4));
+        const auto running = processes_.find(pid);
+        if (running == processes_.end()) {
+            processes_.insert(pid);
+            return machine_.expect_server(pid, "peer");
+        }
+        processes_.erase(running);
         machine_.on_process_ended(pid, "peer", "was killed", now_);
     }
     void goodbye() {
@@ -310,6 +318,7 @@ class ClientScript : private ClientWorld {
     TimeNs now_ = k_second_ns;
     bool reachable_ = true;
     int new_states_ = 0;
+    std::set<std::uint32_t> processes_;
     std::vector<SentLease> leases_;
     std::vector<BegunRound> rounds_;
     EventStore store_;

@@ -257,6 +257,35 @@ TEST_CASE("files that claim to be huge are refused before memory is taken") {
     CHECK_FALSE(bool(decode_hdr(exr, "x")));
 }
 
+TEST_CASE("a picture whose file could not hold it is refused before it is made up of zeros") {
+    // A .tga of 24 bits: no name, no palette, this type (2 plain, 10 in runs), its sides, then pixels.
+    const auto tga = [](int type, int width, int height, const std::string& pixels) {
+        std::string head(18, '\0');
+        head[2] = char(type);
+        head[12] = char(width % 256);
+        head[13] = char(width / 256);
+        head[14] = char(height % 256);
+        head[15] = char(height / 256);
+        head[16] = 24;
+        return head + pixels;
+    };
+    for (const int type : {2, 10}) {
+        const auto refused = decode_ldr(tga(type, 11'776, 8192, "x"), "a.tga");
+        REQUIRE_FALSE(bool(refused));
+        CHECK(refused.error().message ==
+              "a.tga: says it has 11776x8192 pixels, which its 19 bytes cannot hold; it is cut short.");
+    }
+    // One colour all over, 128 pixels in each run of four bytes, is what a file can do.
+    std::string runs;
+    for (int i = 0; i < 512; ++i)
+        runs +=
+            "\xff"
+            "abc";
+    const auto flat = decode_ldr(tga(10, 256, 256, runs), "a.tga");
+    REQUIRE(bool(flat));
+    CHECK(flat->bytes.size() == 3u * 256 * 256);
+}
+
 TEST_CASE("a .png that inflates to far more than its size says is stopped") {
     // 12 MB of black in a few kB; then the head is made to promise one pixel.
     const testing::TemporaryFolder folder;
