@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "formats.hpp"
+#include "jpeg_tables.hpp"
 
 namespace {
 
@@ -29,6 +30,12 @@ void* budget_realloc(void* old, std::size_t bytes) {
 
 }  // namespace
 
+// Sums and shifts that overflow are the library's own, in numbers that it bounds later; what it writes beyond is not.
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((no_sanitize("signed-integer-overflow", "shift"))), \
+                             apply_to = function)
+#endif
+
 #define STBI_MALLOC(bytes) budget_malloc(bytes)
 #define STBI_REALLOC(old, bytes) budget_realloc(old, bytes)
 #define STBI_FREE(memory) std::free(memory)
@@ -47,6 +54,10 @@ void* budget_realloc(void* old, std::size_t bytes) {
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #include <stb_image_write.h>
 
+#if defined(__clang__)
+#pragma clang attribute pop
+#endif
+
 namespace pathscope {
 namespace {
 
@@ -63,10 +74,13 @@ struct PictureInfo {
 
 const stbi_uc* data_of(std::string_view bytes) { return reinterpret_cast<const stbi_uc*>(bytes.data()); }
 
-/// A .tga has no mark at its start, so anything that is nothing else would pass for one but for its name.
+/// A .tga has no mark at its start, so anything that is nothing else would pass for one but for its name. Its second byte
+/// is 0 or 1, as that of no other kind is: else the decoder would find another kind by marks of its own.
 bool is_supported(std::string_view bytes, std::string_view name) {
-    return bytes.starts_with("\x89PNG") || bytes.starts_with("\xff\xd8\xff") || bytes.starts_with("BM") ||
-           name.ends_with(".tga") || name.ends_with(".TGA");
+    if (bytes.starts_with("\x89PNG") || bytes.starts_with("\xff\xd8\xff") || bytes.starts_with("BM"))
+        return true;
+    return (name.ends_with(".tga") || name.ends_with(".TGA")) && bytes.size() > 2 && bytes[1] >= 0 &&
+           bytes[1] <= 1;
 }
 
 Error broken(std::string_view name) {
@@ -98,6 +112,9 @@ Result<void> check_enough_bytes(const PictureInfo& info, std::string_view bytes,
 Result<PictureInfo> prepare(std::string_view bytes, std::string_view name) {
     if (bytes.size() > INT_MAX)
         return bad_input(fmt::format("{}: a picture of over 2 GiB is not read.", name));
+    if (bytes.starts_with("\xff\xd8\xff") && !huffman_tables_fit(bytes))
+        return bad_input(
+            fmt::format("{}: the picture is broken (a Huffman table has over 256 codes).", name));
     constexpr std::size_t k_bytes_per_pixel = 64, k_bytes_per_file_byte = 8, k_bytes_at_least = 1 << 20;
     t_budget_bytes = k_bytes_at_least;
     PictureInfo info;

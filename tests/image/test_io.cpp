@@ -286,6 +286,33 @@ TEST_CASE("a picture whose file could not hold it is refused before it is made u
     CHECK(flat->bytes.size() == 3u * 256 * 256);
 }
 
+TEST_CASE("a .jpg with a Huffman table of more than 256 codes never reaches its decoder") {
+    const auto segment = [](char marker, const std::string& content) {
+        const std::size_t length = content.size() + 2;
+        return std::string{'\xff', marker, char(length / 256), char(length % 256)} + content;
+    };
+    const std::string start = "\xff\xd8", scan = segment('\xda', "x") + "pixels";
+    const std::string overfull = segment('\xc4', std::string(17, '\x11') + "codes");  // 16 * 17 = 272
+    const std::string full = segment('\xc4', '\0' + std::string(16, '\x10') + std::string(256, 'c'));
+    const std::string empty_then_overfull = segment('\xc4', std::string(17, '\0') + std::string(17, '\x11'));
+    const std::string hidden = segment('\xe1', overfull);  // In metadata it means nothing.
+    const auto refused = [&](const std::string& file) {
+        const auto image = decode_ldr(file, "a.jpg");
+        REQUIRE_FALSE(bool(image));
+        return image.error().message.find("over 256 codes") != std::string::npos;
+    };
+    CHECK(refused(start + overfull));
+    CHECK(refused(start + full + overfull));
+    CHECK(refused(start + empty_then_overfull));
+    CHECK(refused(start + scan + overfull));
+    CHECK(refused(start + hidden + scan + overfull));
+    CHECK(refused(start + overfull.substr(0, 21)));
+    // The decoder sees a .jpg behind more of the first byte, too; we do not, whatever it is called.
+    CHECK_FALSE(bool(decode_ldr("\xff\xff" + start + overfull, "a.tga")));
+    CHECK_FALSE(refused(start + full));  // Broken in other ways.
+    CHECK_FALSE(refused(start + hidden + full + scan));
+}
+
 TEST_CASE("a .png that inflates to far more than its size says is stopped") {
     // 12 MB of black in a few kB; then the head is made to promise one pixel.
     const testing::TemporaryFolder folder;
