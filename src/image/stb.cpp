@@ -30,10 +30,11 @@ void* budget_realloc(void* old, std::size_t bytes) {
 
 }  // namespace
 
-// Sums and shifts that overflow are the library's own, in numbers that it bounds later; what it writes beyond is not.
+// Sums and shifts that overflow, and no bytes copied to nowhere, are the library's own; what it writes beyond its memory is not.
 #if defined(__clang__)
-#pragma clang attribute push(__attribute__((no_sanitize("signed-integer-overflow", "shift"))), \
-                             apply_to = function)
+#pragma clang attribute push(                                                              \
+    __attribute__((no_sanitize("signed-integer-overflow", "shift", "nonnull-attribute"))), \
+    apply_to = function)
 #endif
 
 #define STBI_MALLOC(bytes) budget_malloc(bytes)
