@@ -63,6 +63,8 @@ std::vector<std::string> seeds() {
     with_light(R"("point", "position": [0, 3, 0], "intensity": [5, 5, 5])");
     with_light(R"("sun", "to_sun": [0, 1, 0], "irradiance": [1, 1, 1], "angle_deg": 0.5)");
     with_light(R"("sky", "radiance": [0.5, 0.5, 1])");
+    with_light(R"("sky", "radiance": [0, 3e38, 0])");
+    with_light(R"("sky", "radiance": [0, 0, 1e-45])");
     with_light(R"("envmap", "file": "sky.pfm", "scale": 2, "rotate_y": 90)");
     seeds.push_back(R"({"name": "n", "obj": ["a.obj", "b.obj"], "up_axis": "Z", "units_to_metres": 0.01,
         "camera": {"name": "c", "position": [0, 0, 4], "look_at": [0, 0, 0], "up": [0, 1, 0], "vfov_deg": 40, "aspect": "16:9"},
