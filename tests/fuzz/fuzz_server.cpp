@@ -133,7 +133,7 @@ class ServerScript : private ServerWorld {
         message::Input input;
         input.session = k_session;
         input.epoch.value = ++epoch_;
-        input.sequence = ++sequence_;
+        input.sequence = std::max<std::uint64_t>(1, ++sequence_);
         input.state_hash = state_hash(small_state(next));
         input.changes = pack(PackValue(state_changes(small_state(state_), small_state(next))));
         if (in_.below(8) == 0) input.changes = in_.text();
