@@ -23,3 +23,9 @@ if(PATHSCOPE_SANITIZE)
     # Tests ask this where a figure depends on the sanitizer's slowness (time limits, sample counts).
     target_compile_definitions(pathscope_flags INTERFACE PATHSCOPE_SANITIZED=1)
 endif()
+
+# libFuzzer: the libraries tell it which branches are taken; its main is linked to the targets alone (cmake/Modules.cmake).
+option(PATHSCOPE_FUZZ "Build the fuzz targets; needs clang" OFF)
+if(PATHSCOPE_FUZZ)
+    target_compile_options(pathscope_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()

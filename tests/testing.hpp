@@ -6,7 +6,8 @@
 #include <doctest/doctest.h>
 
 #include <filesystem>
-#include <string>
+
+#include "temporary_folder.hpp"
 
 namespace pathscope::testing {
 
@@ -24,25 +25,5 @@ inline std::filesystem::path shared_folder() {
     const std::filesystem::path folder = "../shared";
     return std::filesystem::is_directory(folder) ? folder : std::filesystem::path{};
 }
-
-/// A fresh folder, removed with everything in it at the end of the scope.
-class TemporaryFolder {
-  public:
-    TemporaryFolder() {
-        std::string pattern = (std::filesystem::temp_directory_path() / "pathscope_XXXXXX").string();
-        path_ = ::mkdtemp(pattern.data());
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    const std::filesystem::path& path() const { return path_; }
-
-  private:
-    std::filesystem::path path_;
-};
 
 }  // namespace pathscope::testing

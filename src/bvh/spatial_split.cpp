@@ -136,7 +136,8 @@ std::optional<SpatialSplit> find_spatial_split(const Mesh& mesh, std::span<const
 
 std::size_t divide_at(const SpatialSplit& split, const Mesh& mesh, std::vector<Reference>& references,
                       std::size_t begin) {
-    const auto [axis, plane] = std::pair(split.axis, split.plane);
+    const int axis = split.axis;
+    const float plane = split.plane;
     // Cut first: the right halves go to the end, which is the right side in any case.
     for (std::size_t i = begin, end = references.size(); i < end; ++i) {
         if (!(references[i].low[axis] < plane && references[i].high[axis] > plane)) continue;

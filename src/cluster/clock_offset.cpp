@@ -5,16 +5,10 @@
 #include <cstdlib>
 
 namespace pathscope {
-namespace {
-
-/// Beyond 73 years a clock is a lie, and the sums below would overflow.
-bool plausible(TimeNs time) { return time >= -(TimeNs{1} << 61) && time <= TimeNs{1} << 61; }
-
-}  // namespace
 
 std::optional<TimeNs> ClockEstimate::add(const ClockExchange& exchange) {
     const auto& [sent, received, answered, returned] = exchange;
-    if (!plausible(sent) || !plausible(received) || !plausible(answered) || !plausible(returned))
+    if (!is_plausible(sent) || !is_plausible(received) || !is_plausible(answered) || !is_plausible(returned))
         return std::nullopt;
     if (returned < sent || answered < received) return std::nullopt;
     const TimeNs rtt = (returned - sent) - (answered - received);

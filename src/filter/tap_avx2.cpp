@@ -1,4 +1,6 @@
-#if defined(__x86_64__)
+#include "pathscope/math/simd_level.hpp"
+
+#if defined(PATHSCOPE_HAS_SIMD_LEVELS)
 
 // All that is shared with other instruction sets comes first.
 #include <immintrin.h>

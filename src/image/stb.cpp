@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "formats.hpp"
+#include "jpeg_tables.hpp"
 
 namespace {
 
@@ -29,6 +30,13 @@ void* budget_realloc(void* old, std::size_t bytes) {
 
 }  // namespace
 
+// Sums and shifts that overflow, and no bytes copied to nowhere, are the library's own; what it writes beyond its memory is not.
+#if defined(__clang__)
+#pragma clang attribute push(                                                              \
+    __attribute__((no_sanitize("signed-integer-overflow", "shift", "nonnull-attribute"))), \
+    apply_to = function)
+#endif
+
 #define STBI_MALLOC(bytes) budget_malloc(bytes)
 #define STBI_REALLOC(old, bytes) budget_realloc(old, bytes)
 #define STBI_FREE(memory) std::free(memory)
@@ -47,6 +55,10 @@ void* budget_realloc(void* old, std::size_t bytes) {
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #include <stb_image_write.h>
 
+#if defined(__clang__)
+#pragma clang attribute pop
+#endif
+
 namespace pathscope {
 namespace {
 
@@ -63,10 +75,13 @@ struct PictureInfo {
 
 const stbi_uc* data_of(std::string_view bytes) { return reinterpret_cast<const stbi_uc*>(bytes.data()); }
 
-/// A .tga has no mark at its start, so anything that is nothing else would pass for one but for its name.
+/// A .tga has no mark at its start, so anything that is nothing else would pass for one but for its name. Its second byte
+/// is 0 or 1, as that of no other kind is: else the decoder would find another kind by marks of its own.
 bool is_supported(std::string_view bytes, std::string_view name) {
-    return bytes.starts_with("\x89PNG") || bytes.starts_with("\xff\xd8\xff") || bytes.starts_with("BM") ||
-           name.ends_with(".tga") || name.ends_with(".TGA");
+    if (bytes.starts_with("\x89PNG") || bytes.starts_with("\xff\xd8\xff") || bytes.starts_with("BM"))
+        return true;
+    return (name.ends_with(".tga") || name.ends_with(".TGA")) && bytes.size() > 2 && bytes[1] >= 0 &&
+           bytes[1] <= 1;
 }
 
 Error broken(std::string_view name) {
@@ -75,17 +90,39 @@ Error broken(std::string_view name) {
         fmt::format("{}: the picture is broken ({}).", name, reason ? reason : "no reason given"));
 }
 
+/// What a format can do at most, of one colour all over: .png one bit per pixel, deflated by 1032; .jpg one bit per 8 x 8
+/// pixels; .bmp one bit per pixel; .hdr and .tga runs of 127 and 128.
+std::size_t most_pixels_per_byte(std::string_view bytes) {
+    if (bytes.starts_with("\x89PNG")) return 8 * 1032;
+    if (bytes.starts_with("\xff\xd8\xff")) return 8 * 64;
+    if (bytes.starts_with("BM")) return 8;
+    return is_rgbe(bytes) ? 16 : 64;
+}
+
+/// The decoders of .tga and .hdr take zeros for what is missing: twenty bytes would become a picture of any size.
+Result<void> check_enough_bytes(const PictureInfo& info, std::string_view bytes, std::string_view name) {
+    const std::size_t pixels = std::size_t(info.width) * std::size_t(info.height);
+    if (pixels / most_pixels_per_byte(bytes) <= bytes.size()) return {};
+    return bad_input(
+        fmt::format("{}: says it has {}x{} pixels, which its {} bytes cannot hold; it is cut short.", name,
+                    info.width, info.height, bytes.size()));
+}
+
 /// Size and channels, and a budget on this thread for decoding that much. Per pixel: 16 bytes of result, and the same
 /// three times over for what decoders hold meanwhile; per byte of the file: gathering it from its pieces.
 Result<PictureInfo> prepare(std::string_view bytes, std::string_view name) {
     if (bytes.size() > INT_MAX)
         return bad_input(fmt::format("{}: a picture of over 2 GiB is not read.", name));
+    if (bytes.starts_with("\xff\xd8\xff") && !huffman_tables_fit(bytes))
+        return bad_input(
+            fmt::format("{}: the picture is broken (a Huffman table has over 256 codes).", name));
     constexpr std::size_t k_bytes_per_pixel = 64, k_bytes_per_file_byte = 8, k_bytes_at_least = 1 << 20;
     t_budget_bytes = k_bytes_at_least;
     PictureInfo info;
     if (!stbi_info_from_memory(data_of(bytes), int(bytes.size()), &info.width, &info.height, &info.channels))
         return broken(name);
     if (const auto size = check_picture_size(info.width, info.height, name); !size) return size.error();
+    if (const auto whole = check_enough_bytes(info, bytes, name); !whole) return whole.error();
     t_budget_bytes = k_bytes_at_least + k_bytes_per_file_byte * bytes.size() +
                      k_bytes_per_pixel * std::size_t(info.width) * std::size_t(info.height);
     return info;

@@ -14,7 +14,7 @@ SimdLevel asked_for() {
 }  // namespace
 
 SimdLevel highest_simd_level() {
-#if defined(__x86_64__)
+#if defined(PATHSCOPE_HAS_SIMD_LEVELS)
     const bool avx2 =
         __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi");
     if (avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl"))

@@ -16,22 +16,22 @@ float sine_of(double degrees) { return float(std::sin(degrees * (k_double_pi / 1
 
 /// Each radiance sends π per area; from the whole sphere of directions, 4π through each point of the disc.
 double power_of(const LightTable&, const TriangleLight& light, double) {
-    return luminance(light.mean_radiance) * k_double_pi * light.area * (light.two_sided ? 2 : 1);
+    return double(luminance(light.mean_radiance)) * k_double_pi * light.area * (light.two_sided ? 2 : 1);
 }
 double power_of(const LightTable&, const SphereLight& light, double) {
-    return luminance(light.radiance) * k_double_pi * light_area(light);
+    return double(luminance(light.radiance)) * k_double_pi * light_area(light);
 }
 double power_of(const LightTable&, const PointLight& light, double) {
-    return luminance(light.intensity) * 4 * k_double_pi;
+    return double(luminance(light.intensity)) * 4 * k_double_pi;
 }
 double power_of(const LightTable&, const SunLight& light, double disc_area) {
-    return luminance(light.irradiance) * disc_area;
+    return double(luminance(light.irradiance)) * disc_area;
 }
 double power_of(const LightTable&, const SkyLight& light, double disc_area) {
-    return luminance(light.radiance) * 4 * k_double_pi * disc_area;
+    return double(luminance(light.radiance)) * 4 * k_double_pi * disc_area;
 }
 double power_of(const LightTable& table, const EnvironmentLight& light, double disc_area) {
-    return luminance(table.environments[light.map].mean_radiance) * 4 * k_double_pi * disc_area;
+    return double(luminance(table.environments[light.map].mean_radiance)) * 4 * k_double_pi * disc_area;
 }
 
 std::vector<double> weights_by_power(const LightTable& table, float scene_radius) {
@@ -53,11 +53,13 @@ std::vector<double> weights_by_area(const LightTable& table) {
 }
 
 /// Relative to the largest, so that they fit into floats; none becomes zero.
+/// Light so faint that its luminance is zero is light all the same: if all is, all are alike.
 Distribution1d make_pick(const std::vector<double>& weights) {
     const double largest = *std::max_element(weights.begin(), weights.end());
     std::vector<float> relative;
     for (const double weight : weights)
-        relative.push_back(std::max(float(weight / largest), std::numeric_limits<float>::min()));
+        relative.push_back(
+            std::max(largest > 0 ? float(weight / largest) : 1, std::numeric_limits<float>::min()));
     auto pick = Distribution1d::make(relative);
     CHECK(pick, weights.size(), largest);
     return *std::move(pick);

@@ -15,6 +15,8 @@ namespace {
 
 /// Squares of distances and areas must stay finite in floats.
 constexpr float k_largest_coordinate = 1e15f;
+/// So must the light of many bounces and samples.
+constexpr float k_brightest = 1e30f;
 
 // ---- Surfaces of the scene file's lights.
 
@@ -228,6 +230,14 @@ void measure_brightness(Scene& scene) {
     scene.brightest_radiance = max_component(max(typical, max(surfaces, infinity)));
 }
 
+/// A sun of next to no width may be brighter than any float, whatever its irradiance.
+Result<void> check_brightness(const Scene& scene) {
+    if (scene.typical_radiance <= k_brightest && scene.brightest_radiance <= k_brightest) return {};
+    return bad_input(
+        "The lights of the scene are brighter than light can be computed in; make them darker, or the sun "
+        "wider.");
+}
+
 }  // namespace
 
 Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBuild& build) {
@@ -255,8 +265,9 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBui
     add_sphere_lights(scene);
     for (const LightSpec& light : file.lights)
         if (auto added = std::visit(AddLight{file, parts, scene.lights}, light); !added) return added.error();
-    finish_light_table(scene.lights, scene_radius(scene), light_bounds(scene));
     measure_brightness(scene);
+    if (auto fits = check_brightness(scene); !fits) return fits.error();
+    finish_light_table(scene.lights, scene_radius(scene), light_bounds(scene));
     if (scene.lights.empty()) log_warning("The scene has no light: the image will be black.");
     return scene;
 }

@@ -218,9 +218,8 @@ void ClientMachine::on_revoked(const std::string& instance, std::string_view why
 void ClientMachine::say_goodbye(TimeNs now) {
     now_ = now;
     for (const auto& [instance, server] : servers_) {
-        const bool is_ours =
-            std::any_of(local_servers_.begin(), local_servers_.end(),
-                        [&](const LocalServer& local) { return local.is(server.pid, server.name); });
+        const auto is_it = [&it = server](const LocalServer& local) { return local.is(it.pid, it.name); };
+        const bool is_ours = std::any_of(local_servers_.begin(), local_servers_.end(), is_it);
         send(Channel::monitor, instance,
              message::Bye{is_ours ? ByeReason::stop : ByeReason::leaving, "The frame is finished."});
     }

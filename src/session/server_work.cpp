@@ -7,9 +7,17 @@
 #include "pathscope/protocol/block_result.hpp"
 
 namespace pathscope {
+namespace {
+
+/// A client within its credits has fewer answers on their way than these and its credits: what is left are CREDIT and NACK.
+constexpr std::size_t k_more_answers = 8;
+
+}  // namespace
 
 void ServerMachine::on(message::Lease& lease) {
     if (lease.session != session_ || !held_ || holds_lease(lease.lease)) return;
+    // Who grants without end and takes no answer would fill the memory with answers. These leases expire.
+    if (unsent_answers_.size() > credits_ + k_more_answers) return;
     received_ = std::max(received_, lease.lease);
     if (draining_) return refuse(lease, NackCode::draining);
     if (leases_.size() >= credits_) return refuse(lease, NackCode::busy);

@@ -315,6 +315,13 @@ void PackMap::set(std::string_view key, PackValue value) {
     entries_.push_back({std::string(key), std::move(value)});
 }
 
+PackMap::PackMap() = default;
+PackMap::PackMap(const PackMap&) = default;
+PackMap::PackMap(PackMap&&) noexcept = default;
+PackMap& PackMap::operator=(const PackMap&) = default;
+PackMap& PackMap::operator=(PackMap&&) noexcept = default;
+PackMap::~PackMap() = default;
+
 std::optional<PackMap> PackMap::from_entries(std::vector<PackEntry> entries) {
     // By sorting, not by looking each key up: a peer may send a map of half a million keys.
     std::vector<std::string_view> keys;

@@ -84,3 +84,19 @@ TEST_CASE("impossible exchanges are refused, and cannot overflow") {
     CHECK(estimate.add({-huge, huge, huge, -huge}).has_value());
     CHECK(estimate.at(0)->offset == 2 * huge);
 }
+
+TEST_CASE(
+    "a moment that is plausible can be moved to the client's time line, and a plausible span added to it") {
+    const TimeNs huge = TimeNs{1} << 61;
+    CHECK(is_plausible(0));
+    CHECK(is_plausible(huge));
+    CHECK(is_plausible(-huge));
+    CHECK_FALSE(is_plausible(huge + 1));
+    CHECK_FALSE(is_plausible(std::numeric_limits<TimeNs>::max()));
+    CHECK_FALSE(is_plausible(std::numeric_limits<TimeNs>::min()));
+    ClockEstimate estimate;  // A server whose clock stands at zero, and a client that runs for 73 years.
+    REQUIRE(estimate.add({huge - 100, 0, 0, huge}).has_value());
+    const TimeNs moved = estimate.at(huge)->to_client(huge);
+    CHECK(moved == 2 * huge - 50);
+    CHECK(std::numeric_limits<TimeNs>::max() - moved > huge);
+}

@@ -257,6 +257,62 @@ TEST_CASE("files that claim to be huge are refused before memory is taken") {
     CHECK_FALSE(bool(decode_hdr(exr, "x")));
 }
 
+TEST_CASE("a picture whose file could not hold it is refused before it is made up of zeros") {
+    // A .tga of 24 bits: no name, no palette, this type (2 plain, 10 in runs), its sides, then pixels.
+    const auto tga = [](int type, int width, int height, const std::string& pixels) {
+        std::string head(18, '\0');
+        head[2] = char(type);
+        head[12] = char(width % 256);
+        head[13] = char(width / 256);
+        head[14] = char(height % 256);
+        head[15] = char(height / 256);
+        head[16] = 24;
+        return head + pixels;
+    };
+    for (const int type : {2, 10}) {
+        const auto refused = decode_ldr(tga(type, 11'776, 8192, "x"), "a.tga");
+        REQUIRE_FALSE(bool(refused));
+        CHECK(refused.error().message ==
+              "a.tga: says it has 11776x8192 pixels, which its 19 bytes cannot hold; it is cut short.");
+    }
+    // One colour all over, 128 pixels in each run of four bytes, is what a file can do.
+    std::string runs;
+    for (int i = 0; i < 512; ++i)
+        runs +=
+            "\xff"
+            "abc";
+    const auto flat = decode_ldr(tga(10, 256, 256, runs), "a.tga");
+    REQUIRE(bool(flat));
+    CHECK(flat->bytes.size() == 3u * 256 * 256);
+}
+
+TEST_CASE("a .jpg with a Huffman table of more than 256 codes never reaches its decoder") {
+    const auto segment = [](char marker, const std::string& content) {
+        const std::size_t length = content.size() + 2;
+        return std::string{'\xff', marker, char(length / 256), char(length % 256)} + content;
+    };
+    const std::string start = "\xff\xd8", scan = segment('\xda', "x") + "pixels";
+    const std::string overfull = segment('\xc4', std::string(17, '\x11') + "codes");  // 16 * 17 = 272
+    const std::string full = segment('\xc4', '\0' + std::string(16, '\x10') + std::string(256, 'c'));
+    const std::string empty_then_overfull = segment('\xc4', std::string(17, '\0') + std::string(17, '\x11'));
+    const std::string hidden = segment('\xe1', overfull);  // In metadata it means nothing.
+    const auto refused = [&](const std::string& file) {
+        const auto image = decode_ldr(file, "a.jpg");
+        REQUIRE_FALSE(bool(image));
+        return image.error().message.find("over 256 codes") != std::string::npos;
+    };
+    CHECK(refused(start + overfull));
+    CHECK(refused(start + full + overfull));
+    CHECK(refused(start + empty_then_overfull));
+    CHECK(refused(start + scan + overfull));
+    CHECK(refused(start + hidden + scan + overfull));
+    CHECK(refused(start + overfull.substr(0, 21)));
+    // The decoder sees a .jpg behind more of the first byte, too; we do not, whatever it is called.
+    CHECK_FALSE(bool(decode_ldr("\xff\xff" + start + overfull, "a.tga")));
+    CHECK_FALSE(refused(start + full));  // Broken in other ways.
+    CHECK_FALSE(refused(start + hidden + full + scan));
+}
+
 TEST_CASE("a .png that inflates to far more than its size says is stopped") {
     // 12 MB of black in a few kB; then the head is made to promise one pixel.
     const testing::TemporaryFolder folder;

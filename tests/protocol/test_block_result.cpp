@@ -70,6 +70,11 @@ TEST_CASE("a tile whose codec, size, hash or range is wrong is refused with a se
     bad.codec = "zip";
     CHECK(refusal(bad, 64) == "TILE: codec 'zip' is not known.");
     CHECK(refusal(good, 63).find("'raw_bytes' is 1536, but 63 pixels have 1512") != std::string::npos);
+    for (const std::uint32_t claim : {0u, 1u, 1u << 31, ~0u}) {
+        bad = good;
+        bad.raw_bytes = claim;
+        CHECK(refusal(bad, 64).find("'raw_bytes' is") != std::string::npos);
+    }
     bad = good;
     bad.hash[0] ^= 1;
     CHECK(refusal(bad, 64).find("'hash'") != std::string::npos);

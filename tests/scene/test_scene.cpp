@@ -1,3 +1,5 @@
+#include <limits>
+
 #include "pathscope/math/random.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "small_scenes.hpp"
@@ -157,12 +159,37 @@ TEST_CASE("bounds hold mesh, quads and spheres; an empty scene has a disc for th
     CHECK(scene_radius(small_scene({SkySpec{k_white}})) == 1);
 }
 
+TEST_CASE("the brightest and the faintest lights can be picked from") {
+    constexpr float k_faintest = std::numeric_limits<float>::denorm_min();
+    for (const float value : {1e30f, k_faintest}) {
+        const Scene scene = small_scene({SkySpec{{0, 0, value}}, PointLightSpec{{0, 1, 0}, {0, 0, value}}});
+        REQUIRE(scene.lights.lights.size() == 2);
+        for (std::uint32_t light = 0; light < 2; ++light)
+            CHECK(pick_probability(scene.lights, LightSampling::power, {}, light) > 0);
+    }
+}
+
 TEST_CASE("what cannot be computed with is refused in a sentence") {
     SceneFile file;
     file.lights = {SphereLightSpec{{0, 1e20f, 0}, 1, k_white}};
     const auto huge = make_scene(file, empty_parts(), {.threads = 1});
     REQUIRE_FALSE(huge);
     CHECK(huge.error().message.find("scale it down") != std::string::npos);
+
+    // Each of these numbers is a float; what follows from them is none: a disc too narrow, a sky from all sides.
+    constexpr float k_most = std::numeric_limits<float>::max();
+    const std::vector<std::vector<LightSpec>> too_bright{
+        {SunSpec{{0, 1, 0}, {k_most, 0, 0}, 0.53f}},
+        {SunSpec{{0, 1, 0}, k_white, 1e-18f}},
+        {SkySpec{{0, k_most, 0}}},
+        {SkySpec{{0, k_most, 0}}, SkySpec{{0, k_most, 0}}},
+    };
+    for (const std::vector<LightSpec>& lights : too_bright) {
+        file.lights = lights;
+        const auto glaring = make_scene(file, empty_parts(), {.threads = 1});
+        REQUIRE_FALSE(glaring);
+        CHECK(glaring.error().message.find("make them darker") != std::string::npos);
+    }
 
     file.lights = {EnvmapSpec{"night.hdr", 1, 0}};
     SceneParts parts = empty_parts();

@@ -103,6 +103,27 @@ TEST_CASE("another size than expected is refused, and bombs before they unpack")
     CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, "", 800)));
 }
 
+TEST_CASE("a frame that claims 0, 1, 2^31 or 2^32 - 1 bytes is refused before memory is taken for them") {
+    // RFC 8878: magic; descriptor of a single segment with a content size of 4 bytes; the size; an empty last block.
+    const auto claiming = [](std::uint32_t bytes) {
+        std::string frame("\x28\xB5\x2F\xFD\xA0", 5);
+        for (int i = 0; i < 4; ++i) frame += char(bytes >> 8 * i);
+        return frame + std::string("\1\0\0", 3);
+    };
+    CHECK(bool(unpack_bytes(Codec::shuffle_zstd, claiming(0), 0)));  // That one keeps its word.
+    for (const std::uint32_t claim : {0u, 1u, 1u << 31, ~0u}) {
+        CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, claiming(claim), 24)));
+        CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, claiming(claim), 1 << 20)));
+    }
+    // Even the size that is expected is not there.
+    CHECK_FALSE(bool(unpack_bytes(Codec::shuffle_zstd, claiming(24), 24)));
+    // What is expected is the receiver's own figure, but no frame makes it take memory that it does not claim as well.
+    for (const std::size_t expected :
+         {std::size_t{0}, std::size_t{1}, std::size_t{1} << 31, (std::size_t{1} << 32) - 1})
+        for (const auto& entry : k_codec_names)
+            CHECK_FALSE(bool(unpack_bytes(entry.value, claiming(24), expected)));
+}
+
 TEST_CASE("a frame that does not state its size is refused") {
     const std::string content(800, 'x');
     std::string frame(ZSTD_compressBound(content.size()), '\0');

@@ -20,6 +20,11 @@
 
 namespace pathscope {
 
+/// Beyond 73 years a clock is a lie, and sums of such moments would overflow: what a peer says is asked for this first.
+[[nodiscard]] constexpr bool is_plausible(TimeNs time) {
+    return time >= -(TimeNs{1} << 61) && time <= TimeNs{1} << 61;
+}
+
 struct ClockExchange {
     TimeNs sent = 0;      ///< t0, client clock.
     TimeNs received = 0;  ///< t1, server clock.
@@ -32,6 +37,7 @@ struct ClockOffset {
     TimeNs error = 0;   ///< The true offset lies within offset +- error.
     TimeNs rtt = 0;     ///< Of the exchange that says so.
 
+    /// Requires: is_plausible(server_time).
     [[nodiscard]] TimeNs to_client(TimeNs server_time) const { return server_time - offset; }
 };
 

@@ -21,6 +21,8 @@ struct EnumName {
     E value;
     std::string_view name;
 };
+template <class E>
+EnumName(E, std::string_view) -> EnumName<E>;  // What C++20 deduces by itself; clang 14 does not yet.
 
 template <class E>
 [[nodiscard]] constexpr std::string_view name_of(E value) {

@@ -5,12 +5,20 @@
 /// what is rendered. The environment variable PATHSCOPE_SIMD = portable, avx2 or avx512 asks for a lower one than the
 /// machine has; a higher one is not granted.
 ///
+/// The faster levels need a compiler that obeys "#pragma GCC target": clang passes over it, so its programs (those of the
+/// fuzzers) have the portable level only.
+///
 /// Thread safety: pure.   Test: tests/math/test_simd.cpp
 
 #include <array>
 #include <cstdint>
 
 #include "pathscope/core/enum_names.hpp"
+
+/// Whether this build has the levels above portable.
+#if defined(__x86_64__) && !defined(__clang__)
+#define PATHSCOPE_HAS_SIMD_LEVELS 1
+#endif
 
 namespace pathscope {
 

@@ -46,6 +46,14 @@ struct PackBytes {
 /// Keys in the order they were set. Lookup is linear: maps here have a few dozen keys.
 class PackMap {
   public:
+    // Defined where entries are complete, which a variant that holds a map asks for earlier.
+    PackMap();
+    PackMap(const PackMap&);
+    PackMap(PackMap&&) noexcept;
+    PackMap& operator=(const PackMap&);
+    PackMap& operator=(PackMap&&) noexcept;
+    ~PackMap();
+
     /// Nothing if a key is there twice.
     [[nodiscard]] static std::optional<PackMap> from_entries(std::vector<PackEntry> entries);
 

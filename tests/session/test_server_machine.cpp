@@ -1,0 +1,101 @@
+#include "pathscope/session/server_machine.hpp"
+
+#include "pathscope/protocol/block_result.hpp"
+
+#include "testing.hpp"
+
+using namespace pathscope;
+using namespace pathscope::testing;
+
+namespace {
+
+/// A world in which rounds end at once, and whose network can be stopped.
+class StoppableWorld : public ServerWorld {
+  public:
+    bool send(Channel, Frames frames) override {
+        if (stopped) return false;
+        sent.push_back(std::move(frames));
+        return true;
+    }
+    void begin(RoundJob job) override { begun.push_back(std::move(job)); }
+    void cancel(std::uint64_t) override {}
+    void cancel_all() override {}
+    void load(RenderState state, Manifest) override { wanted = std::move(state); }
+
+    bool stopped = false;
+    std::vector<Frames> sent;
+    std::vector<RoundJob> begun;
+    std::optional<RenderState> wanted;
+};
+
+RenderState small_state() {
+    RenderState state;
+    state.scene = *parse_scene_file(
+        R"({"obj": "a.obj", "camera": {"position": [0, 0, 4], "look_at": [0, 0, 0]}})", "a.json");
+    state.files = hash_text(pack_manifest({}));
+    state.camera = state.scene.cameras.front().view;
+    state.settings.width = state.settings.height = 8;
+    return state;
+}
+
+}  // namespace
+
+TEST_CASE("a client that grants without end and takes no answer does not fill the server's memory") {
+    constexpr std::uint64_t k_session = 77;
+    constexpr std::uint32_t k_credits = 2;
+    const TemporaryFolder folder;
+    StoppableWorld world;
+    ServerMachine server({"server", "0", "build", 1, 7, "client"}, SceneCache(folder.path()), world);
+    TimeNs now = k_second_ns;
+    const auto say = [&](Message message) {
+        const Channel channel = k_message_table[message.index()].channel;
+        server.on_message(encode(std::move(message)), channel, now);
+        server.on_timers(now);
+    };
+
+    // It joins: welcome, manifest, scene.
+    const std::string packed = pack(PackValue(encode_state(small_state())));
+    server.on_linked(std::string(16, 'i'), now);
+    say(message::Welcome{k_session, ServerId{1}, 250, 5000, k_credits, Epoch{1}, 0, hash_text(packed),
+                         packed});
+    say(message::Manifest{hash_text(pack_manifest({})), pack_manifest({})});
+    REQUIRE(world.wanted.has_value());
+    LoadedScene loaded{*world.wanted, std::make_shared<const Scene>()};
+    server.on_loaded(loaded, now);
+    REQUIRE(server.working_on().has_value());
+
+    // Nothing leaves any more; leases come, and their rounds end as if nothing were wrong.
+    world.stopped = true;
+    message::Lease lease;
+    lease.session = k_session;
+    lease.epoch = Epoch{1};
+    lease.strategy = k_blocks_strategy;
+    lease.rect = {0, 0, 4, 4};
+    lease.count = lease.lease_ms = 1;
+    const auto finish_one = [&] {
+        RoundOutcome outcome;
+        outcome.ticket = world.begun.back().ticket;
+        outcome.result.emplace();
+        outcome.result->sums.resize(16);
+        world.begun.pop_back();
+        server.on_outcome(outcome, now);
+    };
+    std::size_t most = 0;
+    for (int i = 0; i < 1000; ++i) {
+        lease.lease.value = std::uint64_t(i) + 1;
+        say(lease);
+        if (i % 3 == 0 && !world.begun.empty()) finish_one();
+        most = std::max(most, server.unsent_answers() + server.leases());
+    }
+    CHECK(most >= 2 * k_credits);  // Else nothing was put to the test.
+    CHECK(most <= 2 * k_credits + 9);
+
+    // What was kept leaves once the network is back, and work goes on.
+    world.stopped = false;
+    server.on_timers(now);
+    CHECK(server.unsent_answers() == 0);
+    while (!world.begun.empty()) finish_one();
+    lease.lease.value = 2000;
+    say(lease);
+    CHECK(world.begun.size() == 1);
+}
