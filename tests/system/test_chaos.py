@@ -117,7 +117,7 @@ class Cluster(unittest.TestCase):
 
     def test_half_close_and_refusal(self):
         _, faults = self.render_through("600ms fault half-close up link 3\n1s fault half-close down link 2\n"
-                                        "1.4s fault refuse on\n1.5s fault cut\n2.5s fault refuse off\n")
+                                        "1.4s fault refuse on\n1.5s fault cut\n2.5s fault refuse off\n", speed_cap=150_000)
         self.assertGreaterEqual(faults["links"][2]["up"]["half_closes"], 1)
         self.assertGreaterEqual(sum(link["refused"] for link in faults["links"]), 1)
 
