@@ -142,6 +142,8 @@ void SimulatedCluster::plan_faults() {
 }
 
 void SimulatedCluster::move_camera() {
+    // A paused client's frame may be done, and is not the last: this state is still to come.
+    if (client_->frozen()) return time_.at(time_.now() + 15 * k_millisecond_ns, [this] { move_camera(); });
     --settings_.new_states;
     client_->when_awake([this] {
         RenderState state = client_->machine().state();
