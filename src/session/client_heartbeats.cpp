@@ -26,7 +26,9 @@ void ClientMachine::on(Server& server, message::Ping& message) {
 void ClientMachine::on(Server& server, message::Pong& message) {
     server.detector.on_heartbeat(now_);
     const auto rtt = server.clock.add({TimeNs(message.token), message.received_ns, message.sent_ns, now_});
-    if (rtt) store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
+    if (!rtt) return;
+    server.round_trip = server.clock.at(now_)->rtt;
+    store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
 }
 
 bool ClientMachine::ping(Server& server) {

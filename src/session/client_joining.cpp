@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "pathscope/cluster/credit_policy.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/session/build_identity.hpp"
 
@@ -9,7 +10,6 @@ namespace pathscope {
 namespace {
 
 constexpr std::size_t k_max_servers = 4096;
-constexpr std::uint32_t k_server_credits = 2;  ///< One round in work, one waiting: no pause between them.
 
 /// A LEASE that has not arrived after this time will not.
 constexpr TimeNs k_longest_way = 2 * k_second_ns;
@@ -76,7 +76,7 @@ message::Welcome ClientMachine::welcome(ServerId id) const {
     welcome.server = id;
     welcome.heartbeat_ms = std::uint32_t(heartbeat_ / k_millisecond_ns);
     welcome.dead_after_ms = std::uint32_t(dead_after_of(config_.detector) / k_millisecond_ns);
-    welcome.credits = k_server_credits;
+    welcome.credits = k_most_credits;
     welcome.epoch = work_.epoch();
     welcome.sequence = sequence_;
     welcome.state_hash = state_hash_;
@@ -115,7 +115,7 @@ void ClientMachine::on(Server& server, message::Ready& message) {
 void ClientMachine::on(Server& server, message::Credit& message) {
     // It was welcomed by the client that ran before this one, and does not hear what this one says.
     if (message.session != session_) return ask_who(server.instance);
-    server.credits.set_limit(std::min(message.credits, k_server_credits));
+    server.credits.set_limit(std::min<std::size_t>(message.credits, k_most_credits));
     for (const LeaseId lease : server.credits.settle_lost(message.received, now_ - k_longest_way))
         work_.indirect_ledger().release(lease, server.peer.id(), now_);
 }

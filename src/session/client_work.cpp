@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "pathscope/cluster/credit_policy.hpp"
 #include "pathscope/core/log.hpp"
 #include "pathscope/protocol/block_result.hpp"
 
@@ -89,9 +90,25 @@ void ClientMachine::hand_out_to_servers() {
 
 /// Whether it is left with nothing more to do though it could.
 bool ClientMachine::hand_out_to(Server& server) {
-    while (server.peer.accepts_work() && server.credits.available())
+    while (server.peer.accepts_work() && server.credits.available() &&
+           server.credits.owed() < window_of(server)) {
+        if (work_.indirect_ledger().outstanding() >= most_leases(most_result_bytes())) return false;
         if (!grant_to(server)) return true;
+    }
     return false;
+}
+
+/// Of a round of full size. Those at the frame's edge, and the scouts of an adaptive frame, are smaller.
+double ClientMachine::samples_of_full_round() const {
+    return double(config_.block_size) * config_.block_size * config_.round_samples;
+}
+
+std::uint64_t ClientMachine::most_result_bytes() const {
+    return std::uint64_t(config_.block_size) * std::uint64_t(config_.block_size) * sizeof(PixelSum);
+}
+
+std::size_t ClientMachine::window_of(const Server& server) const {
+    return credit_window(server.round_trip, server.speed.predict(samples_of_full_round()));
 }
 
 bool ClientMachine::grant_to(Server& server) {
@@ -106,10 +123,9 @@ bool ClientMachine::grant_to(Server& server) {
     std::optional<Lease> lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.
-        const double samples = double(config_.block_size) * config_.block_size * config_.round_samples;
-        if (auto estimate = server.speed.predict(samples)) {
-            // Of its turnaround, a round in front of it took a part.
-            *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(server.credits.limit()));
+        if (auto estimate = server.speed.predict(samples_of_full_round())) {
+            // Of its turnaround, the rounds in front of it took a part.
+            *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(window_of(server)));
             if (const auto straggler = pick_straggler(work_.indirect_ledger(), id, now_, *estimate))
                 lease = work_.indirect_ledger().grant_copy(id, *straggler, now_, lease_duration(estimate, 1));
         }

@@ -54,6 +54,7 @@ struct ClusterTotals {
     std::uint64_t kills = 0, freezes = 0, partitions = 0, drains = 0, joins = 0, pauses = 0, restarts = 0,
                   new_states = 0;
     std::uint64_t bad_messages = 0, deaths = 0;
+    std::uint64_t most_leases = 0;  ///< Of one server at once.
     LedgerCounts ledger;
     TimeNs virtual_time = 0;
 

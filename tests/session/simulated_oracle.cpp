@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "pathscope/cluster/credit_policy.hpp"
+
 #include "simulated_processes.hpp"
 
 namespace pathscope::testing {
@@ -35,10 +37,13 @@ bool SimulatedCluster::someone_can_work() const {
 void SimulatedCluster::check_all() {
     const FrameWork& work = client_->machine().work();
     if (const auto audit = work.indirect_ledger().audit(); !audit) fail(audit.error().message);
-    for (const auto& server : servers_)
-        if (server->machine().leases() > 2 || server->machine().unsent_answers() > 4)
+    for (const auto& server : servers_) {
+        totals_.most_leases = std::max<std::uint64_t>(totals_.most_leases, server->machine().leases());
+        if (server->machine().leases() > k_most_credits ||
+            server->machine().unsent_answers() > 2 * k_most_credits)
             fail(fmt::format("a server holds {} leases and {} unsent answers", server->machine().leases(),
                              server->machine().unsent_answers()));
+    }
     check_progress();
 }
 

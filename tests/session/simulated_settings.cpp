@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "simulated_cluster.hpp"
@@ -68,6 +69,7 @@ void ClusterTotals::add(const ClusterTotals& other) {
     new_states += other.new_states;
     bad_messages += other.bad_messages;
     deaths += other.deaths;
+    most_leases = std::max(most_leases, other.most_leases);
     virtual_time += other.virtual_time;
     ledger.granted += other.ledger.granted;
     ledger.accepted += other.ledger.accepted;

@@ -124,6 +124,7 @@ class ClientMachine {
         Peer peer;
         FailureDetector detector;
         ClockEstimate clock{};
+        std::optional<TimeNs> round_trip{};  ///< The shortest of late.
         Credits credits{0};
         SpeedEstimate speed{};
         Turnaround turnaround{};
@@ -192,6 +193,9 @@ class ClientMachine {
     void hand_out();
     void hand_out_to_servers();
     bool hand_out_to(Server& server);
+    [[nodiscard]] double samples_of_full_round() const;
+    [[nodiscard]] std::uint64_t most_result_bytes() const;
+    [[nodiscard]] std::size_t window_of(const Server& server) const;
     bool grant_to(Server& server);
     void send_lease(Server& server, const Lease& lease);
     [[nodiscard]] std::optional<LocalWork> next_local_work();
