@@ -2,6 +2,7 @@
 ///
 ///     PATHSCOPE_SEED=17 build/release/test_session -tc="*whatever the network*"       one world, again
 ///     PATHSCOPE_SEEDS=100000 ...                                                      more of them
+///     PATHSCOPE_DAMAGE=20 ...                                 a bit flips in so many of a hundred messages
 
 #include <fmt/format.h>
 
@@ -43,6 +44,7 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
     const Silence silence;
     const std::uint32_t chosen = number_from_environment("PATHSCOPE_SEED");
     const std::uint32_t asked = number_from_environment("PATHSCOPE_SEEDS");
+    const std::uint32_t damage = number_from_environment("PATHSCOPE_DAMAGE");
     const std::uint32_t seeds = asked != 0 ? asked : k_sanitized ? 200 : 10'000;
     const std::uint32_t first = chosen != 0 ? chosen : 1;
     const int count = chosen != 0 ? 1 : int(seeds);
@@ -52,7 +54,8 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
     int failed = 0;
     std::mutex mutex;
     parallel_for(count, 0, [&](int i) {
-        const ClusterSettings settings = ClusterSettings::from_seed(first + std::uint32_t(i));
+        ClusterSettings settings = ClusterSettings::from_seed(first + std::uint32_t(i));
+        if (damage != 0) settings.damage = float(damage) / 100;
         SimulatedCluster cluster(settings);
         const std::string failure = cluster.run();
         const std::lock_guard lock(mutex);

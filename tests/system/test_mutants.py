@@ -47,9 +47,9 @@ def link_command(commands, extra, out):
     return [*words[:first_object], str(extra), *words[first_object:]]
 
 
-def broken_worlds(program, seeds):
+def broken_worlds(program, seeds, variables):
     """How many of the worlds broke. A program that stops at a CHECK of its own has noticed as well."""
-    environment = dict(os.environ, PATHSCOPE_SEEDS=str(seeds))
+    environment = dict(os.environ, PATHSCOPE_SEEDS=str(seeds), **variables)
     run = subprocess.run([program, "-tc=" + WORLDS], env=environment, capture_output=True, text=True,
                          timeout=PATIENCE_S)
     if "bug:" in run.stderr + run.stdout:
@@ -65,7 +65,7 @@ class Mutants(unittest.TestCase):
     def setUpClass(cls):
         cls.commands = ninja_commands()
 
-    def worlds_broken_by(self, source, *changes, seeds=SEEDS):
+    def worlds_broken_by(self, source, *changes, seeds=SEEDS, **variables):
         text = pathlib.Path(source).read_text()
         for sound, broken in changes:
             self.assertEqual(text.count(sound), 1, f"{source}: {sound!r} is not there exactly once")
@@ -76,15 +76,15 @@ class Mutants(unittest.TestCase):
             for command in (compile_command(self.commands, source, mutant, compiled),
                             link_command(self.commands, compiled, program)):
                 subprocess.run(command, cwd=BUILD, check=True, capture_output=True, text=True)
-            return broken_worlds(program, seeds)
+            return broken_worlds(program, seeds, variables)
 
-    def check(self, source, *changes, seeds=SEEDS):
-        broken = self.worlds_broken_by(source, *changes, seeds=seeds)
+    def check(self, source, *changes, seeds=SEEDS, **variables):
+        broken = self.worlds_broken_by(source, *changes, seeds=seeds, **variables)
         print(f"{self.id().rsplit('.', 1)[-1]}: {broken} of {seeds} worlds broke")
         self.assertGreater(broken, 0)
 
     def test_0_the_sound_program_breaks_none(self):
-        self.assertEqual(broken_worlds(BUILD / "test_session", SEEDS), 0)
+        self.assertEqual(broken_worlds(BUILD / "test_session", SEEDS, {}), 0)
 
     def test_ledger_counts_twice(self):
         """The round's records stay, so that a second result of it is accepted like the first."""
@@ -118,10 +118,10 @@ class Mutants(unittest.TestCase):
                     "        return commit;\n"))
 
     def test_a_damaged_message_is_believed(self):
-        """Few flips make another message that can be read, hence the larger number of worlds."""
+        """Few flips make another message that can be read, hence more worlds, with more flips in them."""
         self.check("src/protocol/decode.cpp",
                    ("    if (sealed && frames[0] != message_head(version, type, frames[1]))\n",
-                    "    if (false)\n"), seeds=1500)
+                    "    if (false)\n"), seeds=500, PATHSCOPE_DAMAGE="20")
 
     def test_a_server_says_ready_only_once(self):
         self.check(SERVER, ("    send_answer(message::Credit{session_, credits_, received_});\n    if (phase_ == Phase::work) send_ready();\n", ""))
