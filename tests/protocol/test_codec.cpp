@@ -110,7 +110,8 @@ TEST_CASE("a message is two frames, or three with a payload, and begins with the
     CHECK(frames[0].starts_with(k_input_topic));
 }
 
-TEST_CASE("S4: what a message is, its type says, whatever its size: that of an order to end, or of a camera") {
+TEST_CASE(
+    "S4: what a message is, its type says, whatever its size: that of an order to end, or of a camera") {
     // The sizes by which the classic system told its messages apart, in bytes.
     for (const std::size_t size : {28, 1, 2, 16, 48, 8, 4}) {
         message::Input input;

@@ -97,8 +97,9 @@ class StagedCluster : private ClientWorld {
         ServerMachine machine_;
     };
 
-    bool lose_inputs = false;              ///< PUB is lossy: here it loses all.
-    std::vector<MessageType> to_strangers; ///< What the client said to peers that are no server of the stage.
+    bool lose_inputs = false;  ///< PUB is lossy: here it loses all.
+    std::vector<MessageType>
+        to_strangers;  ///< What the client said to peers that are no server of the stage.
 
     explicit StagedCluster(std::uint32_t spp = 64) {
         RenderState state;
@@ -194,9 +195,8 @@ class StagedCluster : private ClientWorld {
     }
 
     void to_client(const std::string& instance, Channel channel, Frames frames) {
-        on_their_way_.push_back([=, this, frames = std::move(frames)] {
-            client_->on_message(instance, frames, channel, now_);
-        });
+        on_their_way_.push_back(
+            [=, this, frames = std::move(frames)] { client_->on_message(instance, frames, channel, now_); });
     }
     [[nodiscard]] Server* find(const std::string& instance) {
         for (const auto& server : servers_)
@@ -212,8 +212,7 @@ class StagedCluster : private ClientWorld {
         }
         if (server->killed) return false;
         if (!server->cut)
-            on_their_way_.push_back(
-                [=, frames = std::move(frames)] { server->receive(frames, channel); });
+            on_their_way_.push_back([=, frames = std::move(frames)] { server->receive(frames, channel); });
         return true;
     }
     void publish(Frames frames) override {

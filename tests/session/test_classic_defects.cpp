@@ -23,7 +23,8 @@ class Silence {
     LogSink before_;
 };
 
-constexpr std::uint64_t k_rounds = 4 * 64 / 2;  ///< Of the stage's frame: blocks, samples, samples of a round.
+constexpr std::uint64_t k_rounds =
+    4 * 64 / 2;  ///< Of the stage's frame: blocks, samples, samples of a round.
 
 std::size_t count(const std::vector<MessageType>& all, MessageType type) {
     return std::size_t(std::count(all.begin(), all.end(), type));
@@ -63,7 +64,8 @@ struct BusyServer {
 
 }  // namespace
 
-TEST_CASE("S1: a server that joins or dies restarts nobody: what is committed stays, and is not rendered again") {
+TEST_CASE(
+    "S1: a server that joins or dies restarts nobody: what is committed stays, and is not rendered again") {
     const Silence silence;
     StagedCluster stage;
     StagedCluster::Server& a = stage.add_server();

@@ -180,7 +180,8 @@ TEST_CASE("S13: when the last server leaves in mid-frame, the client carries on 
     CHECK(store.server(ServerId{1})->total(Counter::rounds_committed) > 0);
 }
 
-TEST_CASE("S2: a server that renders for seconds without a pause answers heartbeats, and is not taken for dead") {
+TEST_CASE(
+    "S2: a server that renders for seconds without a pause answers heartbeats, and is not taken for dead") {
     const SmallJob small(4);
     const TemporaryFolder cache;
     EventStore store;
