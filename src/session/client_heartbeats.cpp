@@ -7,9 +7,10 @@
 namespace pathscope {
 namespace {
 
-/// The end of a connection is told a moment before, or after, the socket itself knows.
-constexpr int k_probes = 5;
-constexpr TimeNs k_probe_pause = 10 * k_millisecond_ns;
+/// The end of a connection is told a moment before, or after, the socket itself knows: most often a short one, and on a busy
+/// machine a longer one. So pauses double: 1, 2, 4, ... 32 ms.
+constexpr int k_probes = 7;
+constexpr TimeNs k_first_probe_pause = k_millisecond_ns;
 
 /// Looking at a thousand servers takes a fraction of a millisecond: not after every message.
 constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
@@ -47,7 +48,7 @@ void ClientMachine::on_connection_lost(TimeNs now) {
 /// Who cannot be reached has no connection any more.
 void ClientMachine::probe_connections() {
     --probes_left_;
-    next_probe_ = now_ + k_probe_pause;
+    next_probe_ = now_ + (k_first_probe_pause << (k_probes - 1 - probes_left_));
     std::vector<std::string> unreachable;
     for (auto& [instance, server] : servers_)
         if (!ping(server)) unreachable.push_back(instance);

@@ -65,7 +65,7 @@ TEST_CASE("adaptive: after steady beats, suspect at 0.64 s and dead at 0.73 s of
           doctest::Approx(450 + 5.612 * 50).epsilon(0.002));
 }
 
-TEST_CASE("adaptive: a process frozen for 10 s is found within a second or so, at any phase and jitter") {
+TEST_CASE("S2: adaptive: a process frozen for 10 s is found within a second or so, at any phase and jitter") {
     for (std::uint32_t seed = 0; seed < 50; ++seed) {
         HashRng rng(seed);
         FailureDetector detector(DetectorKind::adaptive, 0);
@@ -128,7 +128,7 @@ TEST_CASE("results are a sign of life, but do not teach a faster rhythm") {
     }
 }
 
-TEST_CASE("a pause of our own is no silence of theirs") {
+TEST_CASE("S2: a pause of our own is no silence of theirs") {
     for (const DetectorKind kind : {DetectorKind::fixed, DetectorKind::adaptive}) {
         FailureDetector detector(kind, 0);
         for (int i = 1; i <= 40; ++i) detector.on_heartbeat(i * k_beat);

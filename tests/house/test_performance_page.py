@@ -17,7 +17,7 @@ PROJECT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(PROJECT / "tools"))
 sys.dont_write_bytecode = True
 
-from performance import bvh_figures, image_figures, limit_figures, plot, scale_figures  # noqa: E402
+from performance import bvh_figures, detection_figures, image_figures, limit_figures, plot, scale_figures  # noqa: E402
 from performance.equal_error import Need, common_error, need, ratio  # noqa: E402
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -73,6 +73,15 @@ SCALE_ROWS = [scale_row(servers, schedule, speeds, 1.0 if schedule == "pull" or 
 
 def scale_file(crowd=None, loopback=None):
     return {**FILE, "bench": "scale", "rows": SCALE_ROWS, "crowd": crowd, "loopback": loopback}
+
+
+def detection_row(servers, load, fault, ms, detector="adaptive"):
+    return {"servers": servers, "load": load, "detector": detector, "fault": fault, "trials": 5, "ms_median": ms, "ms_p90": 1.5 * ms,
+            "ms_min": 0.5 * ms, "ms_max": 2 * ms, "false_deaths": 0, "ms": [ms]}
+
+
+DETECTION_ROWS = [detection_row(servers, load, fault, ms * servers) for servers in (1, 8) for load in ("idle", "saturated")
+                  for fault, ms in (("killed", 2.0), ("frozen", 700.0))] + [detection_row(8, "idle", "killed", 9000.0, "fixed")]
 
 
 class EqualError(unittest.TestCase):
@@ -351,6 +360,18 @@ class Page(unittest.TestCase):
             page = self.page.read_text(encoding="utf-8")
             for words_told in ["| 4 | ghosts | static | lognormal | 0.250 | 0.225 | 0.275 | 2.00 |", "(images/scale-efficiency.svg)", *told]:
                 self.assertIn(words_told, page)
+
+    def test_detection(self):
+        picture, = detection_figures.pictures(DETECTION_ROWS)
+        places = markers(picture)
+        self.assertEqual(len(places), 2 * 2 + 1)  # By their hints: those of both panels that are alike count once.
+        self.assertLess(places["8 servers, frozen, adaptive: 5.6e+03 ms"][1], places["8 servers, killed, adaptive: 16 ms"][1])
+        self.assertIn("idle: 9e+03 ms with 8 servers killed and the detector fixed", picture.alt)
+        done = self.write({**FILE, "bench": "detection", "rows": DETECTION_ROWS, "watch": {"servers": 8, "seconds": 600.0, "false_deaths": 0}})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        page = self.page.read_text(encoding="utf-8")
+        for words_told in ("| 8 | saturated | adaptive | killed | 5 | 16.0 | 24.0 | 8.0 | 32.0 | 0 |", "(images/detection.svg)", "watched for 600 s: 0 given up"):
+            self.assertIn(words_told, page)
 
     def test_limits_beside_the_rays_that_they_bound(self):
         bvh = bvh_file([bvh_row("box", "shadow", "wide", 5, 3, None)])

@@ -110,6 +110,55 @@ TEST_CASE("a message is two frames, or three with a payload, and begins with the
     CHECK(frames[0].starts_with(k_input_topic));
 }
 
+TEST_CASE(
+    "S4: what a message is, its type says, whatever its size: that of an order to end, or of a camera") {
+    // The sizes by which the classic system told its messages apart, in bytes.
+    for (const std::size_t size : {28, 1, 2, 16, 48, 8, 4}) {
+        message::Input input;
+        input.session = input.sequence = 1;
+        input.changes = std::string(size, 'x');  // As the path of a scene may be.
+        Decoded back = decode(encode(input), Role::server, Channel::input);
+        REQUIRE(bool(back));
+        CHECK(std::get<message::Input>(*back).changes == input.changes);
+        message::Bye bye{ByeReason::leaving, input.changes};
+        back = decode(encode(bye), Role::server, Channel::monitor);
+        REQUIRE(bool(back));
+        CHECK(std::get<message::Bye>(*back) == bye);
+        // Bare bytes of any of these sizes are nothing, with or without a head and wherever they come.
+        for (const Channel channel : {Channel::input, Channel::monitor, Channel::frames}) {
+            const Decoded bare = decode({input.changes}, Role::server, channel);
+            REQUIRE_FALSE(bool(bare));
+            CHECK(bare.error().fault == DecodeFault::foreign);
+        }
+        for (const MessageInfo& info : k_message_table) {
+            Frames frames{"", std::string(size, 'x')};
+            frames[0] = message_head(k_protocol_version, std::uint8_t(info.type), frames[1]);
+            const Role reader = info.direction == Direction::to_client ? Role::client : Role::server;
+            const Decoded sealed = decode(std::move(frames), reader, info.channel);
+            REQUIRE_FALSE(bool(sealed));
+            CHECK(sealed.error().fault == DecodeFault::malformed);
+        }
+    }
+}
+
+TEST_CASE("S6: a number is the same bytes on every machine, whatever the width of its own") {
+    const auto bytes_of = [](std::uint64_t offset) {
+        const std::string header = encode(message::PieceRequest{{}, offset, 1})[1];
+        const std::size_t name = header.find("offset");
+        return header.substr(name + 6, header.find("\xA6length") - name - 6);
+    };
+    using namespace std::string_literals;
+    CHECK(bytes_of(0x7f) == "\x7f"s);
+    CHECK(bytes_of(0x80) == "\xcc\x80"s);
+    CHECK(bytes_of(0xffff) == "\xcd\xff\xff"s);
+    CHECK(bytes_of(0x10000) == "\xce\x00\x01\x00\x00"s);
+    CHECK(bytes_of(0xffffffff) == "\xce\xff\xff\xff\xff"s);
+    CHECK(bytes_of(0x100000000) == "\xcf\x00\x00\x00\x01\x00\x00\x00\x00"s);
+    // And a work order is told by its type, not by the bytes that it has.
+    CHECK(type_of(some_lease()) == MessageType::lease);
+    CHECK(encode(some_lease())[0][3] == char(MessageType::lease));
+}
+
 TEST_CASE("fields that are not known are ignored") {
     const Message lease = some_lease();
     Frames frames = encode(lease);

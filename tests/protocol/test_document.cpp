@@ -126,7 +126,7 @@ TEST_CASE("the document's faults are those that decode tells apart, in its order
         CHECK(rows[i][0] == k_decode_fault_names[i].name);
 }
 
-TEST_CASE("the document's bytes are what the code sends") {
+TEST_CASE("S6: the document's bytes are what the code sends") {
     const Frames frames = encode(message::Credit{77, 4, LeaseId{3}});
     CHECK(read_document().hex == to_hex_text(frames[0]) + "\n" + to_hex_text(frames[1]) + "\n");
 }

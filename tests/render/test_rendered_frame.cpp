@@ -36,7 +36,10 @@ Guides wall_with_step(float step) {
 Image combined(const Scene& scene, const Camera& camera, const RenderSettings& settings, int block_size,
                int threads) {
     const LocalRender render = render_locally(scene, camera, settings, block_size, threads);
-    return compose_frame(render.direct, render.indirect, settings, {}, threads).combined;
+    Guides guides;
+    if (settings.filter == FilterPlace::client)
+        guides = render_guides(scene, camera, settings, {0, 0, settings.width, settings.height}, threads);
+    return compose_frame(render.direct, render.indirect, settings, guides, threads).combined;
 }
 
 }  // namespace
@@ -75,13 +78,18 @@ TEST_CASE("the client's filter blurs indirect light alone, and stops at edges of
     CHECK(edge.indirect.at(4, 2).x > 1 - 1e-6f);
 }
 
-TEST_CASE("a local image does not depend on blocks or threads, unless the filter runs on tiles") {
+TEST_CASE("S10: a local image does not depend on blocks or threads, unless the filter runs on tiles") {
     const Scene scene = small_room();
     RenderSettings settings = small_settings(scene);
     const Digest expected = image_hash(combined(scene, room_camera(), settings, 64, 1));
     for (const int block_size : {1, 5, 8})
         for (const int threads : {1, 3})
             CHECK(image_hash(combined(scene, room_camera(), settings, block_size, threads)) == expected);
+
+    settings.filter = FilterPlace::client;  // Of the whole picture: no seams.
+    const Digest filtered = image_hash(combined(scene, room_camera(), settings, 64, 2));
+    CHECK(filtered != expected);
+    CHECK(image_hash(combined(scene, room_camera(), settings, 5, 2)) == filtered);
 
     settings.filter = FilterPlace::server;
     const Digest whole = image_hash(combined(scene, room_camera(), settings, 64, 2));

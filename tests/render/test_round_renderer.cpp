@@ -37,7 +37,7 @@ TEST_CASE("a round does not depend on the threads") {
     }
 }
 
-TEST_CASE("rounds and blocks may be cut anywhere") {
+TEST_CASE("S9: rounds and blocks may be cut anywhere") {
     const Scene scene = small_room();
     const RenderSettings settings = small_settings(scene);
     const BlockGrid grid(settings.width, settings.height, 5);

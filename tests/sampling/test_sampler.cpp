@@ -125,7 +125,7 @@ TEST_CASE("uniform in the square: over samples of a pixel, and over pixels of a 
 }
 
 TEST_CASE(
-    "no relation between pairs, between neighbouring pixels, between seeds, between successive samples") {
+    "S9: no relation between pairs, between neighbouring pixels, between seeds, between successive samples") {
     // One coordinate of each of two points, as a point of the square: uniform if the two are independent.
     // Under sobol each margin is stratified, so the statistic can only be smaller than chi-square's.
     const int n = 1 << 13;

@@ -120,7 +120,7 @@ Digest hash_of(const ClientSession& client) {
 
 }  // namespace
 
-TEST_CASE("the image has the same bits for any number of servers, schedule, block and round size") {
+TEST_CASE("S9: the image has the same bits for any number of servers, schedule, block and round size") {
     const SmallJob small;
     const Digest expected = small.hash_of_one_machine();
     const TemporaryFolder cache;  // Empty at first: the scene travels over the wire.
@@ -166,7 +166,7 @@ TEST_CASE("a server that leaves in mid-frame gives its rounds to the others, one
     CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
 }
 
-TEST_CASE("when the last server leaves in mid-frame, the client carries on alone") {
+TEST_CASE("S13: when the last server leaves in mid-frame, the client carries on alone") {
     const SmallJob small(32);
     const TemporaryFolder cache;
     EventStore store;
@@ -178,6 +178,52 @@ TEST_CASE("when the last server leaves in mid-frame, the client carries on alone
     CHECK(hash_of(*client) == small.hash_of_one_machine());
     CHECK(store.server(k_local_server)->total(Counter::rounds_committed) > 0);
     CHECK(store.server(ServerId{1})->total(Counter::rounds_committed) > 0);
+}
+
+TEST_CASE(
+    "S2: a server that renders for seconds without a pause answers heartbeats, and is not taken for dead") {
+    const SmallJob small(4);
+    const TemporaryFolder cache;
+    EventStore store;
+    ClientConfig config = listening(1);
+    config.block_size = 128;  // The whole frame is one round,
+    config.round_samples = 4;
+    const auto client = std::move(*ClientSession::create(config, small.job(), store));
+    // which takes four times as long as silence is borne: 70 * 40 * 4 samples at this speed are 2.8 s.
+    const RunningServer server(ports_of(*client), cache.path(), 4000);
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(store.total(Counter::servers_joined) == 1);
+    CHECK(store.total(Counter::died) == 0);
+    CHECK(store.server(ServerId{1})->total(Counter::rounds_committed) == 1);
+}
+
+TEST_CASE("S10: what a server filters is what the client gets, block for block") {
+    SmallJob small(4);
+    const TemporaryFolder cache;
+    const auto served = [&](FilterPlace place, int block_size) {
+        small.state.settings.filter = place;
+        EventStore store;
+        ClientConfig config = listening(1);
+        config.block_size = block_size;
+        config.round_samples = 4;  // One round for each block: the filter takes a round as it finds it.
+        const auto client = std::move(*ClientSession::create(config, small.job(), store));
+        const RunningServer server(ports_of(*client), cache.path());
+        REQUIRE(finish(*client));
+        return hash_of(*client);
+    };
+    const auto local = [&](FilterPlace place, int block_size) {
+        small.state.settings.filter = place;
+        const RenderSettings& settings = small.state.settings;
+        const LocalRender one = render_locally(*small.scene, small.state.camera, settings, block_size, 1);
+        return image_hash(compose_frame(one.direct, one.indirect, settings, {}, 1).combined);
+    };
+    const Digest off = served(FilterPlace::off, 16);
+    const Digest at_server = served(FilterPlace::server, 16);
+    CHECK(off == local(FilterPlace::off, 16));
+    CHECK(at_server != off);
+    CHECK(at_server == local(FilterPlace::server, 16));
+    CHECK(at_server != local(FilterPlace::server, 128));  // Seams: who wants none filters at the client.
 }
 
 TEST_CASE("an input in mid-frame reaches the servers, and no result of the old epoch reaches the image") {
@@ -231,7 +277,7 @@ TEST_CASE("adaptive rounds have the same bits alone and with servers, scouts tra
     }
 }
 
-TEST_CASE("a server that loses its client waits for the next one, and serves it") {
+TEST_CASE("S11: a server that loses its client waits for the next one, and serves it") {
     const SmallJob small;
     const TemporaryFolder cache;
     EventStore first_store, second_store;

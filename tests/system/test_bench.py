@@ -149,6 +149,19 @@ class Bench(unittest.TestCase):
         loopback = file["loopback"]
         self.assertTrue(0 < loopback["ratio_min"] <= loopback["ratio"] <= loopback["ratio_max"], loopback)
 
+    def test_detection(self):
+        file = self.measure("detection", "--scene", "scenes/cornell", "--servers", "2", "--seconds", 1)
+        rows = {(row["servers"], row["load"], row["detector"], row["fault"]): row for row in file["rows"]}
+        self.assertEqual(set(rows), {(servers, load, detector, fault) for servers, detector in ((2, "adaptive"), (8, "fixed"))
+                                     for load in ("idle", "saturated") for fault in ("killed", "frozen")})
+        for (_, load, detector, fault), row in rows.items():
+            self.assertEqual((row["trials"], len(row["ms"])), (5, 5))
+            self.assertTrue(0 < row["ms_min"] <= row["ms_median"] <= row["ms_p90"] <= row["ms_max"], row)
+            # However slow the machine: a period must pass without a sign, and silence must have lasted before it means anything.
+            least = {"fixed": 6000 - 100, "adaptive": 300 if fault == "frozen" else 0}[detector]
+            self.assertGreaterEqual(row["ms_min"], least, row)
+        self.assertEqual((file["watch"]["servers"], file["watch"]["seconds"]), (2, 1))
+
     def test_too_few_files_for_ghosts(self):
         few = lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))  # noqa: E731
         done = subprocess.run([BIN / "pathscope-server", "--ghost", "1000"], capture_output=True, text=True, timeout=PATIENCE_S, preexec_fn=few)

@@ -119,7 +119,7 @@ class Faults(unittest.TestCase):
         self.check(stats, died=1)
         self.assertFalse(pathlib.Path(f"/proc/{frozen}").exists(), "the frozen server was left behind")
 
-    def test_all_killed(self):
+    def test_all_killed_S13(self):
         run = Run(self.folder, "--servers", "3")
         for pid in run.working_servers(3):
             os.kill(pid, signal.SIGKILL)

@@ -1,4 +1,5 @@
-"""The simulation must be able to fail: bugs are put in on purpose, one at a time, and each must break a world.
+"""The simulation must be able to fail: bugs are put in on purpose, one at a time, and each must break a world. So must the tests
+of the classic system's defects, S1 to S13 of docs/testing.md: where a few words bring the defect back, its test must fail.
 
     test_mutants.py BUILD      BUILD: a configured build folder with test_session in it
 
@@ -20,6 +21,7 @@ SEEDS = 100
 PATIENCE_S = 600
 
 LEDGER = "src/cluster/ledger.cpp"
+CLIENT = "src/session/client_machine.cpp"
 SERVER = "src/session/server_machine.cpp"
 SERVER_STATE = "src/session/server_state.cpp"
 
@@ -47,6 +49,17 @@ def link_command(commands, extra, out):
     return [*words[:first_object], str(extra), *words[first_object:]]
 
 
+def failed_tests(program, pattern):
+    """Of those whose name fits. A program that stops at a CHECK of its own has noticed as well."""
+    run = subprocess.run([program, "-tc=" + pattern], capture_output=True, text=True, timeout=PATIENCE_S)
+    if "bug:" in run.stderr + run.stdout:
+        return 1
+    found = re.search(r"test cases: +(\d+) \| +\d+ passed \| +(\d+) failed", run.stdout)
+    if not found or found[1] == "0":
+        raise RuntimeError(f"no verdict on {pattern}: {run.stdout[-500:]} {run.stderr[-500:]}")
+    return int(found[2])
+
+
 def broken_worlds(program, seeds, variables):
     """How many of the worlds broke. A program that stops at a CHECK of its own has noticed as well."""
     environment = dict(os.environ, PATHSCOPE_SEEDS=str(seeds), **variables)
@@ -65,7 +78,8 @@ class Mutants(unittest.TestCase):
     def setUpClass(cls):
         cls.commands = ninja_commands()
 
-    def worlds_broken_by(self, source, *changes, seeds=SEEDS, **variables):
+    def verdict_on(self, source, changes, judge):
+        """What `judge` says of the program with the changes."""
         text = pathlib.Path(source).read_text()
         for sound, broken in changes:
             self.assertEqual(text.count(sound), 1, f"{source}: {sound!r} is not there exactly once")
@@ -76,10 +90,10 @@ class Mutants(unittest.TestCase):
             for command in (compile_command(self.commands, source, mutant, compiled),
                             link_command(self.commands, compiled, program)):
                 subprocess.run(command, cwd=BUILD, check=True, capture_output=True, text=True)
-            return broken_worlds(program, seeds, variables)
+            return judge(program)
 
     def check(self, source, *changes, seeds=SEEDS, **variables):
-        broken = self.worlds_broken_by(source, *changes, seeds=seeds, **variables)
+        broken = self.verdict_on(source, changes, lambda program: broken_worlds(program, seeds, variables))
         print(f"{self.id().rsplit('.', 1)[-1]}: {broken} of {seeds} worlds broke")
         self.assertGreater(broken, 0)
 
@@ -129,6 +143,57 @@ class Mutants(unittest.TestCase):
     def test_a_server_never_asks_for_a_snapshot(self):
         self.check(SERVER_STATE, ("    if (send_monitor(message::SnapshotRequest{",
                                   "    if (!held_ && send_monitor(message::SnapshotRequest{"))
+
+    def check_defect(self, number, source, *changes):
+        failed = self.verdict_on(source, changes, lambda program: failed_tests(program, f"S{number}:*"))
+        print(f"S{number}: {failed} tests failed")
+        self.assertGreater(failed, 0)
+
+    def test_S0_the_sound_program_has_no_defect(self):
+        self.assertEqual(failed_tests(BUILD / "test_session", "S*:*"), 0)
+
+    def test_S1_a_death_restarts_all(self):
+        self.check_defect(1, "src/session/client_joining.cpp",
+                          ("    servers_.erase(found);\n",
+                           "    servers_.erase(found);\n    work_.begin(job_.state.settings, Epoch{work_.epoch().value + 1}, now_);\n"))
+
+    def test_S2_a_server_renders_where_it_listens(self):
+        self.check_defect(2, "src/session/server_session.cpp",
+                          ("    for (RoundOutcome& outcome : runner_.take_finished()) machine_",
+                           "    while (runner_.pending() > 0)\n        for (RoundOutcome& outcome : runner_.take_finished()) machine_"))
+
+    def test_S3_nobody_tells_a_server_that_it_was_given_up(self):
+        self.check_defect(3, CLIENT, ("    send(Channel::monitor, instance, message::Who{});\n", ""))
+
+    def test_S5_a_server_goes_on_with_the_view_it_has(self):
+        self.check_defect(5, SERVER_STATE, ("    if (send_monitor(message::SnapshotRequest{", "    if (!held_ && send_monitor(message::SnapshotRequest{"))
+
+    def test_S7_the_size_of_a_result_is_believed(self):
+        self.check_defect(7, "src/protocol/block_result.cpp",
+                          ("    const auto expected_bytes = static_cast<std::size_t>(pixels) * sizeof(PixelSum);\n",
+                           "    pixels = tile.raw_bytes / sizeof(PixelSum);\n    const std::size_t expected_bytes = tile.raw_bytes;\n"))
+
+    def test_S8_an_unknown_sender_is_a_server(self):
+        self.check_defect(8, CLIENT, ("        return ask_who(instance);\n",
+                                      "        return on_hello(instance, {instance, \"phantom\", \"0\", std::string(build_identity()), 1, 0});\n"),
+                          ('#include "pathscope/core/log.hpp"\n', '#include "pathscope/core/log.hpp"\n#include "pathscope/session/build_identity.hpp"\n'))
+
+    def test_S9_each_block_has_the_same_random_numbers(self):
+        self.check_defect(9, "src/render/round_renderer.cpp", ("settings.seed, x, y, sample);", "settings.seed, x - round.rect.x, y - round.rect.y, sample);"))
+
+    def test_S10_a_server_sends_what_it_did_not_filter(self):
+        self.check_defect(10, "src/session/round_runner.cpp", ("job.settings.filter == FilterPlace::server", "false"))
+
+    def test_S11_a_server_never_dials_again(self):
+        self.check_defect(11, SERVER, ("    if (!relink_reason_) relink_reason_ = std::move(why);\n", ""), ("    if (now_ - last_heard_ >= dead_after_) {\n", "    if (false) {\n"))
+
+    def test_S12_light_waits_for_the_end_of_the_frame(self):
+        self.check_defect(12, "src/session/frame_work.cpp",
+                          ("    return double(part.ledger.rounds_committed()) /\n", "    return !complete(part) ? 0 : double(part.ledger.rounds_committed()) /\n"))
+
+    def test_S13_without_servers_there_is_direct_light_alone(self):
+        self.check_defect(13, "src/session/client_work.cpp",
+                          ("    bool idle = false;\n    if (std::exchange(serve_all_", "    announced_alone_ = false;\n    bool idle = false;\n    if (std::exchange(serve_all_"))
 
 
 if __name__ == "__main__":

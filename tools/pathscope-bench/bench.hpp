@@ -30,9 +30,9 @@ struct BenchOptions {
     TreeKind tree = TreeKind::wide;
     std::string kind = "incoherent";  ///< Of rays: ray_sets.hpp.
     int passes = 1;
-    std::vector<int> servers{1, 2, 4, 8, 16};  ///< How many, for each row of `scale`.
-    int ghosts = 1000;                         ///< In its crowd.
-    double seconds = 2;                        ///< That one of its frames takes at least.
+    std::vector<int> servers;       ///< How many, for each row.
+    int ghosts = 1000;              ///< In its crowd.
+    std::optional<double> seconds;  ///< `scale`: of a frame. `detection`: of watching.
     std::uint32_t crowd_spp = 64;
 };
 
@@ -54,6 +54,7 @@ struct Bench {
 [[nodiscard]] std::string bench_names();  ///< "bvh, filter": for help and errors.
 
 [[nodiscard]] Result<Report> bench_bvh(const BenchOptions& options);
+[[nodiscard]] Result<Report> bench_detection(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_filter(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_image(const BenchOptions& options);
 [[nodiscard]] Result<Report> bench_ledger(const BenchOptions& options);

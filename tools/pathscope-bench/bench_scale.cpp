@@ -18,6 +18,7 @@
 #include "pathscope/render/rendered_frame.hpp"
 #include "pictures.hpp"
 #include "scene_list.hpp"
+#include "served_job.hpp"
 #include "terminal.hpp"
 
 namespace pathscope::bench {
@@ -51,29 +52,6 @@ ClientJob ghost_job() {
     return {state, std::make_shared<const Scene>(), SceneDepot()};
 }
 
-Result<ClientJob> scene_job(const SceneChoice& choice) {
-    Result<OpenedScene> opened = open_scene(choice.path, {});
-    if (!opened) return opened.error();
-    Result<Scene> scene = make_scene(opened->file, std::move(opened->parts), {.threads = 1});
-    if (!scene) return scene.error();
-    RenderState state;
-    state.scene = opened->file;
-    state.camera = opened->file.cameras.front().view;
-    state.settings.quantum = quantum_for(scene->typical_radiance, scene->brightest_radiance);
-    return ClientJob{state, std::make_shared<const Scene>(std::move(*scene)), SceneDepot(*opened->files)};
-}
-
-/// Indirect light alone, of so many samples per pixel that it comes close to `samples` in all.
-ClientJob sized(ClientJob job, int width, int height, double samples) {
-    RenderSettings& settings = job.state.settings;
-    settings.width = width;
-    settings.height = height;
-    settings.direct_spp = 0;
-    const double spp = samples / (double(width) * double(height));
-    settings.spp = std::uint32_t(std::clamp(spp + 0.5, 1.0, double(k_max_samples_per_pixel)));
-    return job;
-}
-
 ClientConfig make_config(ScheduleKind schedule) {
     ClientConfig config;
     config.block_size = k_block_size;
@@ -82,6 +60,11 @@ ClientConfig make_config(ScheduleKind schedule) {
     config.threads = 1;
     return config;
 }
+
+std::vector<int> servers_of(const BenchOptions& options) {
+    return options.servers.empty() ? std::vector{1, 2, 4, 8, 16} : options.servers;
+}
+double seconds_of(const BenchOptions& options) { return options.seconds.value_or(2); }
 
 // ---- Efficiency.
 
@@ -95,24 +78,24 @@ struct Case {
 
 std::vector<Case> efficiency_cases(const BenchOptions& options, const std::optional<ClientJob>& scene) {
     std::vector<Case> cases;
-    for (const int servers : options.servers)
+    for (const int servers : servers_of(options))
         for (const ScheduleKind schedule : {ScheduleKind::pull, ScheduleKind::static_shares})
             for (const double sigma : {0.0, k_sigma}) {
                 Case one;
                 one.fleet = {servers, true, {k_ghost_speed, sigma}, k_speed_seed, 0};
                 one.schedule = schedule;
                 one.config = make_config(schedule);
-                one.job =
-                    sized(ghost_job(), k_width, k_height, one.fleet.samples_per_second() * options.seconds);
+                one.job = sized(ghost_job(), k_width, k_height,
+                                one.fleet.samples_per_second() * seconds_of(options));
                 cases.push_back(std::move(one));
             }
     if (!scene) return cases;
-    for (const int servers : options.servers) {
+    for (const int servers : servers_of(options)) {
         Case one;
         one.fleet = {servers, false, {}, 0, k_process_speed};
         one.config = make_config(one.schedule);
         one.config.round_samples = 1;  // As slow as they are, a round would else be a tenth of the frame.
-        one.job = sized(*scene, k_width, k_height, one.fleet.samples_per_second() * options.seconds);
+        one.job = sized(*scene, k_width, k_height, one.fleet.samples_per_second() * seconds_of(options));
         cases.push_back(std::move(one));
     }
     return cases;
@@ -258,7 +241,7 @@ Result<Report> bench_scale(const BenchOptions& options) {
             if (run > 0) cases[i].figures.push_back(*figures);
         }
     for (const Case& one : cases) report.rows.push_back(efficiency_row(one));
-    report.extra["seconds"] = options.seconds;
+    report.extra["seconds"] = seconds_of(options);
     report.extra["crowd"] = std::move(*crowd);
     report.extra["loopback"] = std::move(*loopback);
     show_progress("");

@@ -47,7 +47,7 @@ void add_options(CLI::App& app, BenchOptions& options) {
                    "image: of the picture that is taken for true (256)")
         ->check(samples)
         ->type_name("N");
-    app.add_option("--servers", options.servers, "scale: numbers of servers (1,2,4,8,16)")
+    app.add_option("--servers", options.servers, "scale, detection: numbers of servers (1,2,4,8,16; 1,8,32)")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 1024))
@@ -55,8 +55,10 @@ void add_options(CLI::App& app, BenchOptions& options) {
     app.add_option("--ghosts", options.ghosts, "scale: servers of the crowd; 0 = no crowd (1000)")
         ->check(CLI::Range(0, 4096))
         ->type_name("N");
-    app.add_option("--seconds", options.seconds, "scale: that a frame takes if no server ever waits (2)")
-        ->check(CLI::Range(0.05, 600.0))
+    app.add_option("--seconds", options.seconds,
+                   "scale: that a frame takes if no server ever waits (2); detection: of watching for false "
+                   "deaths (10)")
+        ->check(CLI::Range(0.05, 86'400.0))
         ->type_name("T");
     add_lever(app, "--tree", options.tree, "trace: by which tree");
     app.add_option("--kind", options.kind, "trace: which rays (incoherent)")->type_name("NAME");
