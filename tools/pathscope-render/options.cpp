@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "../common/arguments.hpp"
+#include "pathscope/net/security.hpp"
 #include "pathscope/session/door.hpp"
 #include "pathscope/session/scene_cache.hpp"
 
@@ -120,6 +121,13 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
         ->type_name("N");
     add_mesh_cache(app, client.local_server_mesh_cache);
     app.add_option("--stats", options.stats, "write figures of the run as JSON")->type_name("FILE");
+    const auto metrics =
+        app.add_option("--metrics", options.metrics,
+                       "answer http://ADDR:PORT/metrics, for Prometheus; port 0 = a free one")
+            ->type_name("ADDR:PORT");
+    app.add_flag("--metrics-public", options.metrics_public,
+                 "of --metrics: other machines may read it, without keys")
+        ->needs(metrics);
     app.add_option("--trace", options.trace, "write a time line for ui.perfetto.dev")->type_name("FILE");
 }
 
@@ -181,6 +189,15 @@ Result<void> check_keys(RenderOptions& options, const KeyOptions& keys) {
     return client.listens ? check_listening(client) : Result<void>();
 }
 
+/// Figures are for this machine's eyes, unless the user says otherwise.
+Result<void> check_metrics(const RenderOptions& options) {
+    if (!options.metrics || options.metrics_public || !reaches_other_machines("tcp://" + *options.metrics))
+        return {};
+    return bad_input(fmt::format(
+        "--metrics {}: other machines could read this address. Use 127.0.0.1:PORT, or add --metrics-public.",
+        *options.metrics));
+}
+
 /// `flat` is no light: nothing of it may get where a picture goes on from, or be judged as noise.
 Result<void> check_strategy(const RenderOptions& options) {
     if (options.client.strategy == Strategy::blocks) return {};
@@ -238,6 +255,7 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     options.mesh_cache = mesh_cache_of(options.client.local_server_mesh_cache, SceneCache::default_folder());
     if (const auto fits = check_sampling(options); !fits) return fits.error();
     if (const auto fits = check_strategy(options); !fits) return fits.error();
+    if (const auto fits = check_metrics(options); !fits) return fits.error();
     if (app.count("--checkpoint-every") > 0 && !options.checkpoint.write)
         return bad_input("--checkpoint-every: no checkpoint is written; add --checkpoint or --continue.");
     options.client.ports_were_chosen = app.count("--ports") > 0;
