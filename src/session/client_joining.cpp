@@ -24,7 +24,7 @@ TimeNs dead_after_of(DetectorKind kind) {
 std::optional<std::string> ClientMachine::reason_to_reject(const std::string& instance,
                                                            const message::Hello& hello) const {
     if (hello.instance != instance) return "HELLO names another instance than its connection has.";
-    if (hello.build != build_identity())
+    if (depends_on_build(config_.strategy) && hello.build != build_identity())
         return fmt::format(
             "The client is '{}', this server is '{}': their pixels could differ in the last bit. Run "
             "the same build on both machines.",

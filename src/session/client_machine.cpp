@@ -48,6 +48,9 @@ ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uin
 }
 
 Result<void> ClientMachine::resume(const CheckpointFile& file) {
+    if (config_.strategy != Strategy::blocks)
+        return bad_input(
+            fmt::format("A checkpoint is of the strategy 'blocks', not '{}'.", name_of(config_.strategy)));
     if (const auto taken = take_up(file, job_.state, work_, store_); !taken) return taken;
     saturated_ = file.history().saturated;
     dropped_ = file.history().dropped;

@@ -7,7 +7,6 @@
 
 #include "pathscope/cluster/credit_policy.hpp"
 #include "pathscope/core/log.hpp"
-#include "pathscope/protocol/block_result.hpp"
 
 namespace pathscope {
 namespace {
@@ -142,7 +141,7 @@ void ClientMachine::send_lease(Server& server, const Lease& lease) {
     message.session = session_;
     message.lease = lease.id;
     message.epoch = lease.epoch;
-    message.strategy = std::string(k_blocks_strategy);
+    message.strategy = std::string(name_of(config_.strategy));
     message.unit = lease.unit;
     message.rect = work_.round_of(lease).rect;
     message.first = lease.first;
@@ -183,7 +182,8 @@ void ClientMachine::hand_out_locally() {
         const bool direct_too = work->indirect && work->direct;
         const Round round = work_.round_of(work->indirect ? *work->indirect : *work->direct);
         local_work_.emplace(ticket, *work);
-        world_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too});
+        world_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too,
+                      config_.strategy});
     }
 }
 
@@ -219,16 +219,16 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
         work_.commit(LightPart::indirect, claim, {}, now_);
         return;
     }
-    const std::int64_t pixels = work_.rect_of(tile.unit).area();
+    const PixelRect rect = work_.rect_of(tile.unit);
     RoundResult result;
     result.rays = tile.rays;
-    result.samples = std::uint64_t(pixels) * tile.count;
+    result.samples = std::uint64_t(rect.area()) * tile.count;
     result.dropped = tile.dropped;
     result.dropped_count = tile.dropped_count;
     result.saturated_count = tile.saturated_count;
     const TimeNs started = tile.started_ns, render_time = tile.render_ns;
     const LeaseId lease = tile.lease;
-    Result<std::vector<PixelSum>> sums = block_result(std::move(tile), pixels);
+    Result<std::vector<PixelSum>> sums = strategy_result(config_.strategy, std::move(tile), rect);
     if (!sums) {
         work_.indirect_ledger().release(lease, id, now_);
         return count_dropped(id, sums.error().message, Channel::frames);

@@ -63,6 +63,16 @@ std::vector<RoundOutcome> RoundRunner::take_finished() {
 
 void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) const {
     CHECK(!job.direct_too || job.part == LightPart::indirect, job.ticket);
+    if (job.strategy == Strategy::flat && job.part == LightPart::indirect) {
+        RoundResult& result = outcome.result.emplace();
+        result.sums = flat_sums(job.round.rect, job.round.first, job.round.count);
+        result.samples = job.round.samples();
+        if (job.direct_too)
+            outcome.direct = render_round(*job.scene, job.camera, job.settings, LightPart::direct, job.round,
+                                          threads_, &cancelled);
+        if (job.direct_too && !outcome.direct) outcome.result.reset();  // Cancelled.
+        return;
+    }
     if (job.direct_too) {
         auto both = render_both_parts(*job.scene, job.camera, job.settings, job.round, threads_, &cancelled);
         if (!both) return;

@@ -28,14 +28,17 @@ void ServerMachine::on(message::Lease& lease) {
     if (phase_ != Phase::work) return refuse(lease, NackCode::scene);
     const RenderSettings& settings = held_->state.settings;
     const PixelRect frame{0, 0, settings.width, settings.height};
-    if (lease.strategy != k_blocks_strategy || !frame.contains(lease.rect) ||
-        lease.count > k_max_samples_per_pixel || lease.first > k_max_samples_per_pixel - lease.count ||
-        lease.rect.width > k_max_block_size || lease.rect.height > k_max_block_size)
-        return refuse(lease, NackCode::unsupported, "This server renders blocks inside the frame.");
+    const auto strategy = from_name<Strategy>(lease.strategy);
+    if (!strategy || !frame.contains(lease.rect) || lease.count > k_max_samples_per_pixel ||
+        lease.first > k_max_samples_per_pixel - lease.count || lease.rect.width > k_max_block_size ||
+        lease.rect.height > k_max_block_size)
+        return refuse(lease, NackCode::unsupported,
+                      "This server computes 'blocks' and 'flat', inside the frame.");
 
     const Round round{lease.unit, lease.rect, lease.first, lease.count};
     const std::uint64_t ticket = ++last_ticket_;
-    world_.begin({ticket, LightPart::indirect, round, scene_, held_->state.camera, settings});
+    world_.begin(
+        {ticket, LightPart::indirect, round, scene_, held_->state.camera, settings, false, *strategy});
     leases_.emplace(ticket, std::move(lease));
 }
 

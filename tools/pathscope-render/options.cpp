@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "../common/arguments.hpp"
+#include "pathscope/net/security.hpp"
 #include "pathscope/session/door.hpp"
 #include "pathscope/session/scene_cache.hpp"
 
@@ -103,6 +104,8 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
         ->check(CLI::Range(0, 4096))
         ->type_name("N");
     add_ports(app, client.ports);
+    add_lever(app, "--strategy", client.strategy,
+              "what servers compute: indirect light, or arithmetic, to test servers with");
     add_lever(app, "--schedule", client.schedule, "who renders which block");
     add_lever(app, "--detector", client.detector, "when a silent server counts as dead");
     add_lever(app, "--order", client.order, "which blocks come first");
@@ -118,6 +121,13 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
         ->type_name("N");
     add_mesh_cache(app, client.local_server_mesh_cache);
     app.add_option("--stats", options.stats, "write figures of the run as JSON")->type_name("FILE");
+    const auto metrics =
+        app.add_option("--metrics", options.metrics,
+                       "answer http://ADDR:PORT/metrics, for Prometheus; port 0 = a free one")
+            ->type_name("ADDR:PORT");
+    app.add_flag("--metrics-public", options.metrics_public,
+                 "of --metrics: other machines may read it, without keys")
+        ->needs(metrics);
     app.add_option("--trace", options.trace, "write a time line for ui.perfetto.dev")->type_name("FILE");
 }
 
@@ -179,6 +189,27 @@ Result<void> check_keys(RenderOptions& options, const KeyOptions& keys) {
     return client.listens ? check_listening(client) : Result<void>();
 }
 
+/// Figures are for this machine's eyes, unless the user says otherwise.
+Result<void> check_metrics(const RenderOptions& options) {
+    if (!options.metrics || options.metrics_public || !reaches_other_machines("tcp://" + *options.metrics))
+        return {};
+    return bad_input(fmt::format(
+        "--metrics {}: other machines could read this address. Use 127.0.0.1:PORT, or add --metrics-public.",
+        *options.metrics));
+}
+
+/// `flat` is no light: nothing of it may get where a picture goes on from, or be judged as noise.
+Result<void> check_strategy(const RenderOptions& options) {
+    if (options.client.strategy == Strategy::blocks) return {};
+    const char* const other = options.client.sampling.adaptive                        ? "--adaptive on"
+                              : options.client.sampling.target_error > 0              ? "--target-error"
+                              : options.checkpoint.write || options.checkpoint.resume ? "a checkpoint"
+                                                                                      : nullptr;
+    if (!other) return {};
+    return bad_input(fmt::format("--strategy {}: it does not go together with {}.",
+                                 name_of(options.client.strategy), other));
+}
+
 /// What --adaptive and --target-error need of other flags.
 Result<void> check_sampling(const RenderOptions& options) {
     const ClientConfig& client = options.client;
@@ -223,6 +254,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
 
     options.mesh_cache = mesh_cache_of(options.client.local_server_mesh_cache, SceneCache::default_folder());
     if (const auto fits = check_sampling(options); !fits) return fits.error();
+    if (const auto fits = check_strategy(options); !fits) return fits.error();
+    if (const auto fits = check_metrics(options); !fits) return fits.error();
     if (app.count("--checkpoint-every") > 0 && !options.checkpoint.write)
         return bad_input("--checkpoint-every: no checkpoint is written; add --checkpoint or --continue.");
     options.client.ports_were_chosen = app.count("--ports") > 0;

@@ -39,6 +39,8 @@ struct RenderOptions {
     std::vector<std::string> buffers;
     std::optional<float> exposure_ev;
     std::optional<std::filesystem::path> trace, stats;
+    std::optional<std::string> metrics;  ///< ADDR:PORT
+    bool metrics_public = false;
     CheckpointOptions checkpoint;
 };
 

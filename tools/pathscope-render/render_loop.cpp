@@ -14,6 +14,7 @@ namespace pathscope {
 namespace {
 
 constexpr TimeNs k_longest_step = 200 * k_millisecond_ns;
+constexpr TimeNs k_publication_pause = 250 * k_millisecond_ns;
 constexpr TimeNs k_shortest_step =
     10 * k_millisecond_ns;  ///< While a checkpoint that is due waits for a disk.
 
@@ -61,6 +62,7 @@ Result<void> RenderLoop::run(const std::atomic<bool>& interrupted) {
         session_.step(longest_step());
         line.show(session_.progress());
         write_if_due();
+        publish_if_due();
         if (interrupted.load()) return give_up();
     }
     if (const auto written = write_last(); !written && !writer_->failing())
@@ -80,6 +82,14 @@ void RenderLoop::fill(Checkpoint& into) const {
 void RenderLoop::write_if_due() {
     const TimeNs now = monotonic_now();
     if (writer_ && writer_->due(now)) writer_->begin(now, [this](Checkpoint& into) { fill(into); });
+}
+
+void RenderLoop::publish_if_due() {
+    if (!metrics_) return;
+    const TimeNs now = monotonic_now();
+    if (now < next_publication_) return;
+    metrics_->publish(session_.figures(), now);
+    next_publication_ = now + k_publication_pause;
 }
 
 Result<void> RenderLoop::write_last() {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "options.hpp"
+#include "pathscope/metrics/endpoint.hpp"
 #include "pathscope/session/client_session.hpp"
 
 namespace pathscope {
@@ -19,6 +20,9 @@ class RenderLoop {
     RenderLoop(ClientSession& session, const EventStore& store, const CheckpointOptions& options,
                const WorkHistory& earlier, TimeNs begin);
 
+    /// Figures go there, a few times a second. It outlives the loop.
+    void publish_to(MetricsEndpoint& metrics) { metrics_ = &metrics; }
+
     /// Until the frame is complete; an error if it was interrupted before.
     [[nodiscard]] Result<void> run(const std::atomic<bool>& interrupted);
 
@@ -26,6 +30,7 @@ class RenderLoop {
     [[nodiscard]] TimeNs longest_step() const;
     void fill(Checkpoint& into) const;
     void write_if_due();
+    void publish_if_due();
     [[nodiscard]] Result<void> write_last();
     [[nodiscard]] Result<void> give_up();
 
@@ -34,6 +39,8 @@ class RenderLoop {
     const WorkHistory& earlier_;
     TimeNs begin_;
     std::optional<CheckpointWriter> writer_;
+    MetricsEndpoint* metrics_ = nullptr;
+    TimeNs next_publication_ = 0;
 };
 
 }  // namespace pathscope

@@ -128,6 +128,16 @@ ClientConfig complete_config(const RenderOptions& options) {
     return config;
 }
 
+/// Nothing if it was not asked for.
+Result<std::unique_ptr<MetricsEndpoint>> open_metrics(const RenderOptions& options, const EventStore& store) {
+    if (!options.metrics) return std::unique_ptr<MetricsEndpoint>();
+    auto endpoint = MetricsEndpoint::open(*options.metrics, store);
+    if (!endpoint) return bad_input("--metrics: " + endpoint.error().message);
+    log_note(fmt::format("Metrics are at http://{}:{}/metrics.",
+                         options.metrics->substr(0, options.metrics->rfind(':')), (*endpoint)->port()));
+    return endpoint;
+}
+
 void tell_how_to_join(const std::string& endpoint, const std::optional<ClientKeys>& keys) {
     log_note(fmt::format("Waiting for servers at {}; start them with: pathscope-server --connect HOST{}",
                          endpoint,
@@ -156,6 +166,8 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     if (const auto fits = check_budget(options.client, state->settings); !fits) return fits;
 
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
+    const auto metrics = open_metrics(options, store);
+    if (!metrics) return metrics.error();
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
     auto session =
         ClientSession::create(complete_config(options),
@@ -164,6 +176,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     const WorkHistory earlier = figures.resumed.value_or(WorkHistory{});
     if ((*session)->progress().waiting) tell_how_to_join((*session)->endpoints()[1], options.client.keys);
     RenderLoop loop(**session, store, options.checkpoint, earlier, built);
+    if (*metrics) loop.publish_to(**metrics);
     if (const auto done = loop.run(interrupted); !done) return done;
     const TimeNs rendered = monotonic_now();
 

@@ -1,6 +1,6 @@
 #pragma once
 /// How a client session runs: where it listens, which servers it starts, how it hands out work and when it stops.
-/// None of this changes a pixel, but for `sampling`; what else does is in render_state.hpp. How many samples a block gets
+/// None of this changes a pixel, but for `strategy` and `sampling`; what else does is in render_state.hpp. How many samples a block gets
 /// is decided here alone, so that servers need not know the rule.
 
 #include <array>
@@ -15,6 +15,7 @@
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
 #include "pathscope/net/security.hpp"
+#include "pathscope/protocol/strategy.hpp"
 
 namespace pathscope {
 
@@ -41,7 +42,8 @@ struct ClientConfig {
     std::filesystem::path server_program;
     std::string local_server_mesh_cache;  ///< Their --mesh-cache; empty = what they choose themselves.
 
-    int min_servers = 0;  ///< Indirect light waits until so many are ready.
+    int min_servers = 0;                   ///< Indirect light waits until so many are ready.
+    Strategy strategy = Strategy::blocks;  ///< What the servers compute. A checkpoint holds `blocks` only.
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;
     UnitOrder order = UnitOrder::spiral;

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "pathscope/cluster/clock_offset.hpp"
+#include "pathscope/cluster/figures.hpp"
 #include "pathscope/cluster/lease_policy.hpp"
 #include "pathscope/cluster/peer.hpp"
 #include "pathscope/probe/event_store.hpp"
@@ -110,6 +111,7 @@ class ClientMachine {
     /// Nothing is left to wait for: the image is finished, or the time limit was reached and every block has samples.
     [[nodiscard]] bool complete() const { return work_.complete(); }
     [[nodiscard]] Progress progress() const;
+    [[nodiscard]] ClusterFigures figures() const;  ///< client_figures.cpp
     [[nodiscard]] const FrameWork& work() const { return work_; }
     [[nodiscard]] const RenderState& state() const { return job_.state; }
     [[nodiscard]] Epoch epoch() const { return work_.epoch(); }

@@ -39,6 +39,7 @@ class ClientSession : private ClientWorld {
         machine_.change_state(std::move(state), std::move(scene), monotonic_now());
     }
     [[nodiscard]] Progress progress() const { return machine_.progress(); }
+    [[nodiscard]] ClusterFigures figures() const { return machine_.figures(); }
     [[nodiscard]] const FrameWork& work() const { return machine_.work(); }
     [[nodiscard]] const RenderState& state() const { return machine_.state(); }
     [[nodiscard]] Epoch epoch() const { return machine_.epoch(); }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "pathscope/core/clock.hpp"
+#include "pathscope/protocol/strategy.hpp"
 #include "pathscope/render/round_renderer.hpp"
 #include "pathscope/session/worker.hpp"
 
@@ -30,7 +31,8 @@ struct RoundJob {
     std::shared_ptr<const Scene> scene;
     Camera camera;
     RenderSettings settings;
-    bool direct_too = false;  ///< Of the same round, beside `part`, which must be indirect.
+    bool direct_too = false;               ///< Of the same round, beside `part`, which must be indirect.
+    Strategy strategy = Strategy::blocks;  ///< Of the indirect part: with another one it is no light.
 };
 
 struct RoundOutcome {

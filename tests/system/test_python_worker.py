@@ -1,0 +1,142 @@
+"""A server in another language: tools/python-worker, which was written from docs/protocol.md alone, takes part in frames of the strategy
+`flat`. What the picture must be is arithmetic: after n samples 2^20 * (512, (n - 1) / 2, x + y) quanta in each pixel of the block at (x, y),
+to the last bit.
+
+    test_python_worker.py BIN      BIN: the folder of pathscope-render and pathscope-server
+"""
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+SCENE = "scenes/cornell/scene.json"
+WIDTH, HEIGHT, SPP, BLOCK = 100, 70, 32, 32
+PATIENCE_S = 60  # What takes longer has failed.
+
+
+def free_ports():
+    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
+    ports = ",".join(str(taken.getsockname()[1]) for taken in sockets)
+    for taken in sockets:
+        taken.close()
+    return ports
+
+
+def read_pfm(path):
+    """Rows from the top; each pixel three floats."""
+    kind, size, scale, pixels = path.read_bytes().split(b"\n", 3)
+    width, height = map(int, size.split())
+    assert kind == b"PF" and float(scale) < 0
+    floats = list(struct.iter_unpack("<3f", pixels))
+    return [floats[row * width:(row + 1) * width] for row in reversed(range(height))]
+
+
+class PythonWorker(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.environment = dict(os.environ, XDG_CACHE_HOME=temporary.name)
+        self.ports = free_ports()
+
+    def start(self, *command):
+        log = open(self.folder / f"{time.monotonic_ns()}.log", "w+")
+        process = subprocess.Popen([str(word) for word in command], env=self.environment, stderr=log)
+        process.log = log
+        self.addCleanup(log.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def said(self, process):
+        process.log.flush()
+        return pathlib.Path(process.log.name).read_text()
+
+    def client(self, *options, strategy="flat"):
+        return self.start(BIN / "pathscope-render", SCENE, "-o", self.folder / "image.pfm", "--stats", self.folder / "stats.json",
+                          "--size", f"{WIDTH}x{HEIGHT}", "--spp", SPP, "--block", BLOCK, "--indirect-only", "--strategy", strategy,
+                          "--listen", "127.0.0.1", "--ports", self.ports, *options)
+
+    def worker(self, name, seconds_per_tile=0.0):
+        return self.start("tools/python-worker", "--ports", self.ports, "--name", name, "--seconds-per-tile",
+                          seconds_per_tile)
+
+    def server(self, name):
+        return self.start(BIN / "pathscope-server", "--ports", self.ports, "--name", name, "--threads", "1", "--quiet")
+
+    def finish(self, client):
+        self.assertEqual(client.wait(PATIENCE_S), 0, self.said(client))
+        stats = json.loads((self.folder / "stats.json").read_text())
+        self.assertEqual(stats["rounds"], stats["rounds_committed"])
+        quantum = 2.0 ** (20 + stats["quantum_exponent"])
+        for y, row in enumerate(read_pfm(self.folder / "image.pfm")):
+            for x, pixel in enumerate(row):
+                corner = x // BLOCK * BLOCK + y // BLOCK * BLOCK
+                self.assertEqual(pixel, (512 * quantum, (SPP - 1) / 2 * quantum, corner * quantum))
+        return stats, {server["name"]: server for server in stats["servers"]}
+
+    def test_it_joins_is_kept_alive_and_renders_all_of_the_frame(self):
+        client, worker = self.client(), self.worker("python", 0.02)  # 96 tiles, 2 seconds: some heartbeats.
+        stats, servers = self.finish(client)
+        self.assertEqual((stats["servers_joined"], stats["died"], stats["bad_messages"]), (1, 0, 0))
+        self.assertEqual((servers["python"]["tiles"], servers["python"]["samples"]), (stats["rounds"], WIDTH * HEIGHT * SPP))
+        self.assertGreater(servers["python"]["rtt_ms_p50"], 0)
+        self.assertIsNone(worker.poll(), "it looks for the next client")
+        worker.send_signal(signal.SIGTERM)
+        self.assertEqual(worker.wait(PATIENCE_S), 0)
+        self.assertEqual(self.said(worker), "")
+
+    def test_beside_a_server_of_ours(self):
+        client = self.client("--min-servers", "2")
+        self.worker("python", 0.005)
+        self.server("ours")
+        stats, servers = self.finish(client)
+        self.assertEqual((stats["died"], stats["bad_messages"]), (0, 0))
+        self.assertGreater(servers["python"]["tiles"], 0)
+        self.assertGreater(servers["ours"]["tiles"], 0)
+
+    def test_workers_that_are_killed_that_leave_and_that_come(self):
+        client = self.client("--min-servers", "3")
+        first, second, _ = (self.worker(f"python-{i}", 0.05) for i in range(3))
+        limit = time.monotonic() + PATIENCE_S
+        while "Waiting" not in self.said(client):
+            self.assertLess(time.monotonic(), limit)
+            time.sleep(0.02)
+        time.sleep(1.2)
+        first.kill()
+        second.send_signal(signal.SIGTERM)
+        self.worker("late")
+        stats, _ = self.finish(client)  # A tile may come after the BYE that overtook it, and is then nobody's.
+        self.assertLessEqual(stats["died"], 1)
+        self.assertEqual(second.wait(PATIENCE_S), 0)
+
+    def test_a_picture_does_not_take_its_tiles(self):
+        """With the strategy `blocks`, a foreign build is refused: its bits would not be ours."""
+        client, worker = self.client("--min-servers", "1", strategy="blocks"), self.worker("python")
+        self.assertEqual(worker.wait(PATIENCE_S), 1)
+        self.assertIn("Run the same build", self.said(worker))
+        self.assertIn("Refused the server python", self.said(client))
+        self.server("ours")
+        self.assertEqual(client.wait(PATIENCE_S), 0, self.said(client))
+        stats = json.loads((self.folder / "stats.json").read_text())
+        self.assertEqual([server["name"] for server in stats["servers"]], ["ours"])
+
+    def test_it_is_a_page_or_two(self):
+        self.assertLessEqual(len(pathlib.Path("tools/python-worker").read_text().splitlines()), 150)
+
+    def test_no_checkpoint_mixes_strategies(self):
+        client = self.client("--checkpoint", self.folder / "a.ck")
+        self.assertEqual(client.wait(PATIENCE_S), 2)
+        self.assertIn("--strategy flat", self.said(client))
+
+
+if __name__ == "__main__":
+    unittest.main()
