@@ -2,8 +2,9 @@
 /// The result of the strategy `blocks`: sums of the pixels of a rectangle. docs/protocol.md, section 5.4.
 ///
 ///     server:  put_block_result(tile, sums);              // sets codec, raw_bytes, hash, result
-///     client:  block_result(std::move(tile), rect.area()) // checks all four, gives the sums back
+///     client:  read_block_result(tile, sums);             // checks all four, gives the sums back
 ///
+/// The hash is that of the payload as it travels: what was damaged on its way is refused before it is unpacked.
 /// Layout before packing: pixels row by row, for each three int64 little-endian (red, green, blue), in
 /// quanta.
 /// Ensures: sums that come back are in range for the tile's count (image/exact_sum.hpp), so that they may be
@@ -26,7 +27,11 @@ inline constexpr std::string_view k_blocks_strategy = "blocks";
 
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec = Codec::shuffle_zstd);
 
-/// `pixels` is what the lease says, not the tile. The sentence of the error names what does not fit.
-[[nodiscard]] Result<std::vector<PixelSum>> block_result(message::Tile tile, std::int64_t pixels);
+/// One sum for each pixel that the lease names, whatever the tile says. After an error `sums` may hold anything; the
+/// sentence names what does not fit. Into memory of the caller's, since a client reads tens of thousands in a second.
+[[nodiscard]] Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> sums);
+
+/// The same, into new memory.
+[[nodiscard]] Result<std::vector<PixelSum>> block_result(const message::Tile& tile, std::int64_t pixels);
 
 }  // namespace pathscope

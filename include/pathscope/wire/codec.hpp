@@ -15,6 +15,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -34,9 +35,13 @@ struct PackedBytes {
 };
 
 /// Takes any bytes; shuffle_zstd falls back to raw unless the size is a multiple of 8.
-[[nodiscard]] PackedBytes pack_bytes(Codec codec, std::string raw);
+[[nodiscard]] PackedBytes pack_bytes(Codec codec, std::string_view raw);
 
 /// Requires: expected_bytes is the receiver's own expectation, bounded by it, and not a figure from the wire.
-[[nodiscard]] Result<std::string> unpack_bytes(Codec codec, std::string packed, std::size_t expected_bytes);
+[[nodiscard]] Result<std::string> unpack_bytes(Codec codec, std::string_view packed,
+                                               std::size_t expected_bytes);
+
+/// Into memory that is there already, of the size expected. After an error it may hold anything.
+[[nodiscard]] Result<void> unpack_bytes(Codec codec, std::string_view packed, std::span<char> out);
 
 }  // namespace pathscope
