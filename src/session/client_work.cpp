@@ -211,12 +211,14 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     result.dropped_count = tile.dropped_count;
     result.saturated_count = tile.saturated_count;
     arrived_.resize(std::size_t(pixels));
-    if (const auto read = read_block_result(tile, arrived_); !read) {
+    if (const auto read = read_block_result(tile, arrived_, job_.state.settings.wire); !read) {
         work_.indirect_ledger().release(tile.lease, id, now_);
         return count_dropped(id, read.error().message, Channel::frames);
     }
 
     const Commit commit = work_.commit(LightPart::indirect, claim, arrived_, now_);
+    store_.count_all(
+        {{Counter::tile_bytes, tile.result.size()}, {Counter::tile_bytes_unpacked, tile.raw_bytes}}, id);
     server.speed.add(double(result.samples), tile.render_ns);
     server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
@@ -224,8 +226,8 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     const bool may_be_drawn =
         store_.keeps_events() && is_plausible(tile.started_ns) && is_plausible(tile.render_ns);
     if (const auto offset = server.clock.at(now_); offset && may_be_drawn)
-        store_.record({offset->to_client(tile.started_ns), 0, id, 0,
-                       SpanEvent{"render", tile.render_ns, tile.lease}});
+        store_.record(
+            {offset->to_client(tile.started_ns), 0, id, 0, SpanEvent{"render", tile.render_ns, tile.lease}});
     cancel_superseded(commit.superseded);
 }
 

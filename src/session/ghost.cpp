@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include "channel_options.hpp"
 #include "pathscope/math/random.hpp"
@@ -42,11 +43,11 @@ std::vector<PixelSum> noise_from(std::size_t at, std::size_t pixels) {
 /// cannot tell whether it was done for this tile or for one before: so it is done for a few, which then serve again.
 class PackedNoise {
   public:
-    const message::Tile& of(std::size_t pixels, std::uint32_t seed) {
+    const message::Tile& of(std::size_t pixels, WireFormat format, std::uint32_t seed) {
         const std::uint32_t variant = seed % k_variants;
         if (packed_.size() >= k_most) packed_.clear();  // A client may ask for blocks of a million sizes.
-        const auto [found, is_new] = packed_.try_emplace({pixels, variant});
-        if (is_new) put_block_result(found->second, noise_from(variant * k_stride, pixels));
+        const auto [found, is_new] = packed_.try_emplace({pixels, format, variant});
+        if (is_new) put_block_result(found->second, noise_from(variant * k_stride, pixels), format);
         return found->second;
     }
 
@@ -54,7 +55,7 @@ class PackedNoise {
     static constexpr std::uint32_t k_variants = 8;
     static constexpr std::size_t k_stride = 1021;
     static constexpr std::size_t k_most = 64;
-    std::map<std::pair<std::size_t, std::uint32_t>, message::Tile> packed_;
+    std::map<std::tuple<std::size_t, WireFormat, std::uint32_t>, message::Tile> packed_;
 };
 
 std::shared_ptr<const Scene> no_scene() {
@@ -207,9 +208,9 @@ void GhostHost::Ghost::leave() {
     if (machine_.linked()) machine_.say_goodbye(monotonic_now());
 }
 
-void GhostHost::Ghost::pack(message::Tile& tile, const RoundResult& result) const {
+void GhostHost::Ghost::pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
     static thread_local PackedNoise noise;
-    const message::Tile& packed = noise.of(std::size_t(result.samples / tile.count),
+    const message::Tile& packed = noise.of(std::size_t(result.samples / tile.count), format,
                                            hash_combine(hash_u32(tile.unit), tile.first));
     tile.codec = packed.codec;
     tile.raw_bytes = packed.raw_bytes;

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <iterator>
 #include <memory>
+#include <optional>
 
 #include "pathscope/core/check.hpp"
 
@@ -31,8 +32,7 @@ void shuffle_deck(Bytes16 (&deck)[k_word_bytes]) {
     Bytes16 out[k_word_bytes];
     for (std::size_t i = 0; i < k_half; ++i) {
         const Bytes16 a = deck[i], b = deck[i + k_half];
-        out[2 * i] =
-            __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+        out[2 * i] = __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
         out[2 * i + 1] =
             __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
     }
@@ -96,15 +96,14 @@ ZSTD_DCtx* decompressor() {
     return context.get();
 }
 
-PackedBytes pack_shuffled(std::string_view raw) {
-    if (raw.size() % k_word_bytes != 0) return {Codec::raw, std::string(raw)};
-    const std::string planes = shuffle(raw);
-    std::string packed(ZSTD_compressBound(planes.size()), '\0');
-    const std::size_t size = ZSTD_compressCCtx(compressor(), packed.data(), packed.size(), planes.data(),
-                                               planes.size(), k_zstd_level);
-    if (ZSTD_isError(size) || size >= raw.size()) return {Codec::raw, std::string(raw)};
+/// Nothing where it would not save a byte.
+std::optional<std::string> compress(std::string_view bytes) {
+    std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+    const std::size_t size = ZSTD_compressCCtx(compressor(), packed.data(), packed.size(), bytes.data(),
+                                               bytes.size(), k_zstd_level);
+    if (ZSTD_isError(size) || size >= bytes.size()) return std::nullopt;
     packed.resize(size);
-    return {Codec::shuffle_zstd, std::move(packed)};
+    return packed;
 }
 
 /// Whether the packed bytes say of themselves that they hold so many. A bomb is refused here, before any memory is taken.
@@ -113,7 +112,7 @@ Result<void> check_claim(Codec codec, std::string_view packed, std::size_t expec
         if (packed.size() == expected_bytes) return {};
         return bad_input(fmt::format("The payload has {} bytes, not {}.", packed.size(), expected_bytes));
     }
-    if (expected_bytes % k_word_bytes != 0)
+    if (codec == Codec::shuffle_zstd && expected_bytes % k_word_bytes != 0)
         return bad_input(fmt::format("{} bytes are no whole number of 64-bit words.", expected_bytes));
     const unsigned long long claimed = ZSTD_getFrameContentSize(packed.data(), packed.size());
     if (claimed != expected_bytes)
@@ -125,23 +124,30 @@ Result<void> check_claim(Codec codec, std::string_view packed, std::size_t expec
 }
 
 /// Requires: check_claim() for the size of `out`.
-Result<void> unpack_shuffled(std::string_view packed, std::span<char> out) {
-    // Kept from tile to tile: fresh memory for each would cost more than unpacking does.
-    static thread_local std::string planes;
-    planes.resize(out.size());
+Result<void> decompress(std::string_view packed, std::span<char> out) {
     const std::size_t size =
-        ZSTD_decompressDCtx(decompressor(), planes.data(), planes.size(), packed.data(), packed.size());
+        ZSTD_decompressDCtx(decompressor(), out.data(), out.size(), packed.data(), packed.size());
     if (ZSTD_isError(size))
         return bad_input(fmt::format("The Zstandard frame is damaged: {}.", ZSTD_getErrorName(size)));
     if (size != out.size())
         return bad_input(fmt::format("The Zstandard frame holds {} bytes, not {}.", size, out.size()));
+    return {};
+}
+
+/// Requires: check_claim() for the size of `out`.
+Result<void> decompress_shuffled(std::string_view packed, std::span<char> out) {
+    // Kept from tile to tile: fresh memory for each would cost more than unpacking does.
+    static thread_local std::string planes;
+    planes.resize(out.size());
+    if (auto whole = decompress(packed, planes); !whole) return whole;
     unshuffle(planes, out);
     return {};
 }
 
 /// Requires: check_claim() for the size of `out`.
 Result<void> unpack_checked(Codec codec, std::string_view packed, std::span<char> out) {
-    if (codec == Codec::shuffle_zstd) return unpack_shuffled(packed, out);
+    if (codec == Codec::shuffle_zstd) return decompress_shuffled(packed, out);
+    if (codec == Codec::zstd) return decompress(packed, out);
     std::copy(packed.begin(), packed.end(), out.begin());
     return {};
 }
@@ -149,7 +155,11 @@ Result<void> unpack_checked(Codec codec, std::string_view packed, std::span<char
 }  // namespace
 
 PackedBytes pack_bytes(Codec codec, std::string_view raw) {
-    if (codec == Codec::shuffle_zstd) return pack_shuffled(raw);
+    const bool has_words = raw.size() % k_word_bytes == 0;
+    std::optional<std::string> packed;
+    if (codec == Codec::shuffle_zstd && has_words) packed = compress(shuffle(raw));
+    if (codec == Codec::zstd) packed = compress(raw);
+    if (packed) return {codec, std::move(*packed)};
     return {Codec::raw, std::string(raw)};
 }
 

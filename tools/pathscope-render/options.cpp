@@ -84,6 +84,8 @@ void add_levers(CLI::App& app, RenderOptions& options) {
                                options.settings.atrous.levels))
         ->check(CLI::Range(0, k_max_atrous_levels))
         ->type_name("N");
+    add_lever(app, "--wire", options.settings.wire,
+              "in what form light comes from servers; only exact keeps every bit");
 }
 
 void add_cluster_options(CLI::App& app, RenderOptions& options) {

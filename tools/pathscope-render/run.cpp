@@ -156,6 +156,9 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     if (const auto fits = check_budget(options.client, state->settings); !fits) return fits;
 
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
+    if (state->settings.wire != WireFormat::exact)
+        log_note(fmt::format("With --wire {} light loses bits on its way: this image is not reproducible.",
+                             name_of(state->settings.wire)));
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
     auto session =
         ClientSession::create(complete_config(options),

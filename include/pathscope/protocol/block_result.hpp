@@ -18,6 +18,7 @@
 
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/exact_sum.hpp"
+#include "pathscope/image/wire_format.hpp"
 #include "pathscope/protocol/message.hpp"
 #include "pathscope/wire/codec.hpp"
 
@@ -26,12 +27,17 @@ namespace pathscope {
 inline constexpr std::string_view k_blocks_strategy = "blocks";
 
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec = Codec::shuffle_zstd);
+/// The same in a format that may lose bits (image/wire_format.hpp).
+void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, WireFormat format);
 
 /// One sum for each pixel that the lease names, whatever the tile says. After an error `sums` may hold anything; the
 /// sentence names what does not fit. Into memory of the caller's, since a client reads tens of thousands in a second.
-[[nodiscard]] Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> sums);
+/// A tile that lost bits is refused unless its format is the one that was agreed on.
+[[nodiscard]] Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> sums,
+                                             WireFormat agreed = WireFormat::exact);
 
 /// The same, into new memory.
-[[nodiscard]] Result<std::vector<PixelSum>> block_result(const message::Tile& tile, std::int64_t pixels);
+[[nodiscard]] Result<std::vector<PixelSum>> block_result(const message::Tile& tile, std::int64_t pixels,
+                                                         WireFormat agreed = WireFormat::exact);
 
 }  // namespace pathscope

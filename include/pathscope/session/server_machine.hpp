@@ -51,8 +51,8 @@ class ServerWorld {
     virtual bool send(Channel channel, Frames&& frames) = 0;
 
     /// Puts the result of a round into its tile.
-    virtual void pack(message::Tile& tile, const RoundResult& result) const {
-        put_block_result(tile, result.sums);
+    virtual void pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+        put_block_result(tile, result.sums, format);
     }
 
     /// Begins a round. Each has one outcome: on_outcome(). A cancelled one has it soon.

@@ -2,6 +2,7 @@
 /// Pixel codecs: how the sums of a tile become fewer bytes, without losing a bit.
 ///
 ///   raw           the bytes themselves
+///   zstd          one frame of Zstandard at level 1
 ///   shuffle-zstd  bytes of 64-bit words sorted by significance, then Zstandard at level 1
 ///
 /// Why shuffle: a sum of samples fills perhaps 30 of its 64 bits. Sorted by significance, the empty bytes of
@@ -24,9 +25,10 @@
 
 namespace pathscope {
 
-enum class Codec { raw, shuffle_zstd };
+enum class Codec { raw, shuffle_zstd, zstd };
 inline constexpr std::array k_codec_names{EnumName<Codec>{Codec::raw, "raw"},
-                                          EnumName<Codec>{Codec::shuffle_zstd, "shuffle-zstd"}};
+                                          EnumName<Codec>{Codec::shuffle_zstd, "shuffle-zstd"},
+                                          EnumName<Codec>{Codec::zstd, "zstd"}};
 constexpr const auto& enum_table(Codec) { return k_codec_names; }
 
 struct PackedBytes {
