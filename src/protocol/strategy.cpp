@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <utility>
+#include <algorithm>
 
 #include "pathscope/core/check.hpp"
 
@@ -27,15 +27,15 @@ std::vector<PixelSum> flat_sums(const PixelRect& rect, std::uint32_t first, std:
     return std::vector<PixelSum>(std::size_t(rect.area()), sum);
 }
 
-Result<std::vector<PixelSum>> strategy_result(Strategy strategy, message::Tile tile, const PixelRect& rect) {
+Result<void> read_strategy_result(Strategy strategy, const message::Tile& tile, const PixelRect& rect,
+                                  std::span<PixelSum> sums, WireFormat agreed) {
     if (tile.strategy != name_of(strategy))
         return bad_input(fmt::format("TILE: field 'strategy' is '{}', but the lease's is '{}'.",
                                      tile.strategy, name_of(strategy)));
-    const std::uint32_t first = tile.first, count = tile.count;
-    Result<std::vector<PixelSum>> sums = block_result(std::move(tile), rect.area());
-    if (sums && strategy == Strategy::flat && *sums != flat_sums(rect, first, count))
+    if (const auto read = read_block_result(tile, sums, agreed); !read) return read;
+    if (strategy == Strategy::flat && !std::ranges::equal(sums, flat_sums(rect, tile.first, tile.count)))
         return bad_input("TILE: these are not the sums of the strategy 'flat'.");
-    return sums;
+    return {};
 }
 
 }  // namespace pathscope

@@ -223,25 +223,29 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     RoundResult result;
     result.rays = tile.rays;
     result.samples = std::uint64_t(rect.area()) * tile.count;
-    result.dropped = tile.dropped;
+    result.dropped = std::move(tile.dropped);
     result.dropped_count = tile.dropped_count;
     result.saturated_count = tile.saturated_count;
-    const TimeNs started = tile.started_ns, render_time = tile.render_ns;
-    const LeaseId lease = tile.lease;
-    Result<std::vector<PixelSum>> sums = strategy_result(config_.strategy, std::move(tile), rect);
-    if (!sums) {
-        work_.indirect_ledger().release(lease, id, now_);
-        return count_dropped(id, sums.error().message, Channel::frames);
+    arrived_.resize(std::size_t(rect.area()));
+    if (const auto read =
+            read_strategy_result(config_.strategy, tile, rect, arrived_, job_.state.settings.wire);
+        !read) {
+        work_.indirect_ledger().release(tile.lease, id, now_);
+        return count_dropped(id, read.error().message, Channel::frames);
     }
 
-    const Commit commit = work_.commit(LightPart::indirect, claim, *sums, now_);
-    server.speed.add(double(result.samples), render_time);
+    const Commit commit = work_.commit(LightPart::indirect, claim, arrived_, now_);
+    store_.count_all(
+        {{Counter::tile_bytes, tile.result.size()}, {Counter::tile_bytes_unpacked, tile.raw_bytes}}, id);
+    server.speed.add(double(result.samples), tile.render_ns);
     server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
-    const bool may_be_drawn = store_.keeps_events() && is_plausible(started) && is_plausible(render_time);
+    const bool may_be_drawn =
+        store_.keeps_events() && is_plausible(tile.started_ns) && is_plausible(tile.render_ns);
     if (const auto offset = server.clock.at(now_); offset && may_be_drawn)
-        store_.record({offset->to_client(started), 0, id, 0, SpanEvent{"render", render_time, lease}});
+        store_.record(
+            {offset->to_client(tile.started_ns), 0, id, 0, SpanEvent{"render", tile.render_ns, tile.lease}});
     cancel_superseded(commit.superseded);
 }
 

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <map>
+#include <tuple>
 
 #include "channel_options.hpp"
 #include "pathscope/math/random.hpp"
@@ -24,11 +26,10 @@ const std::vector<PixelSum>& noise() {
     return sums;
 }
 
-std::vector<PixelSum> sums_of(const Round& round) {
+std::vector<PixelSum> noise_from(std::size_t at, std::size_t pixels) {
     const std::vector<PixelSum>& all = noise();
-    std::size_t at = hash_combine(hash_u32(round.block), round.first) % all.size();
     std::vector<PixelSum> sums;
-    std::size_t left = std::size_t(round.rect.area());
+    std::size_t left = pixels;
     sums.reserve(left);
     for (; left > 0; at = 0) {
         const std::size_t piece = std::min(left, all.size() - at);
@@ -37,6 +38,25 @@ std::vector<PixelSum> sums_of(const Round& round) {
     }
     return sums;
 }
+
+/// Noise of that many pixels, packed. To pack and hash it costs more than everything else that a ghost does, and a client
+/// cannot tell whether it was done for this tile or for one before: so it is done for a few, which then serve again.
+class PackedNoise {
+  public:
+    const message::Tile& of(std::size_t pixels, WireFormat format, std::uint32_t seed) {
+        const std::uint32_t variant = seed % k_variants;
+        if (packed_.size() >= k_most) packed_.clear();  // A client may ask for blocks of a million sizes.
+        const auto [found, is_new] = packed_.try_emplace({pixels, format, variant});
+        if (is_new) put_block_result(found->second, noise_from(variant * k_stride, pixels), format);
+        return found->second;
+    }
+
+  private:
+    static constexpr std::uint32_t k_variants = 8;
+    static constexpr std::size_t k_stride = 1021;
+    static constexpr std::size_t k_most = 64;
+    std::map<std::tuple<std::size_t, WireFormat, std::uint32_t>, message::Tile> packed_;
+};
 
 std::shared_ptr<const Scene> no_scene() {
     static const auto scene = std::make_shared<const Scene>();
@@ -88,8 +108,7 @@ RoundOutcome ModelledRenderer::take(TimeNs now) {
     CHECK(!queue_.empty() && queue_.front().done <= now, queue_.size());
     RoundOutcome outcome = outcome_of(queue_.front());
     queue_.pop_front();
-    RoundResult result;
-    result.sums = sums_of(outcome.round);
+    RoundResult result;  // Its light is made when it is packed.
     result.samples = result.rays = outcome.round.samples();
     outcome.result = std::move(result);
     return outcome;
@@ -189,7 +208,17 @@ void GhostHost::Ghost::leave() {
     if (machine_.linked()) machine_.say_goodbye(monotonic_now());
 }
 
-bool GhostHost::Ghost::send(Channel channel, Frames frames) {
+void GhostHost::Ghost::pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+    static thread_local PackedNoise noise;
+    const message::Tile& packed = noise.of(std::size_t(result.samples / tile.count), format,
+                                           hash_combine(hash_u32(tile.unit), tile.first));
+    tile.codec = packed.codec;
+    tile.raw_bytes = packed.raw_bytes;
+    tile.hash = packed.hash;
+    tile.result = packed.result;
+}
+
+bool GhostHost::Ghost::send(Channel channel, Frames&& frames) {
     DealerSocket& socket = channel == Channel::monitor ? link_->monitor : link_->frames;
     const bool left = socket.send(std::move(frames)) == SendOutcome::delivered;
     stir(channel);  // Even if it did not leave: the attempt may have taken in news of what arrived.

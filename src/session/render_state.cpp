@@ -10,10 +10,10 @@
 namespace pathscope {
 namespace {
 
-constexpr std::array<std::string_view, 19> k_keys{
+constexpr std::array<std::string_view, 20> k_keys{
     "scene",   "files",      "material", "smoothing", "texel_space",   "camera",     "size",
     "spp",     "direct_spp", "seed",     "light",     "light_samples", "hemisphere", "mis",
-    "sampler", "roulette",   "bounces",  "filter",    "quantum"};
+    "sampler", "roulette",   "bounces",  "filter",    "quantum",       "wire"};
 constexpr std::array<std::string_view, 4> k_filter_keys{"place", "kind", "joint", "atrous"};
 
 PackValue pack_vec(Vec3 v) { return PackArray{double(v.x), double(v.y), double(v.z)}; }
@@ -208,6 +208,7 @@ PackMap encode_state(const RenderState& state) {
     map.set("bounces", transport.max_bounces);
     map.set("filter", encode_filter(settings));
     map.set("quantum", settings.quantum.exponent);
+    map.set("wire", name_of(settings.wire));
     return map;
 }
 
@@ -235,6 +236,7 @@ Result<RenderState> decode_state(const PackMap& map) {
     settings.transport.max_bounces = int(fields.u32("bounces", 0, 1'000'000));
     decode_filter(fields, settings);
     settings.quantum.exponent = int(fields.i64("quantum", Quantum::k_min_exponent, Quantum::k_max_exponent));
+    settings.wire = fields.enumerator<WireFormat>("wire");
     if (fields.error()) return *fields.error();
     return state;
 }

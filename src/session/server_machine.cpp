@@ -142,12 +142,12 @@ bool ServerMachine::send_monitor(Message message) {
 
 /// An answer must not be lost: it waits until the socket takes it.
 void ServerMachine::send_answer(Message message) {
-    unsent_answers_.push_back(std::move(message));
+    unsent_answers_.push_back(encode(std::move(message)));
     flush_answers();
 }
 
 void ServerMachine::flush_answers() {
-    while (!unsent_answers_.empty() && world_.send(Channel::frames, encode(unsent_answers_.front())))
+    while (!unsent_answers_.empty() && world_.send(Channel::frames, std::move(unsent_answers_.front())))
         unsent_answers_.pop_front();
 }
 

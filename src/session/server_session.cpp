@@ -132,7 +132,7 @@ void ServerSession::receive(Socket& socket, Channel channel) {
           [&](Frames frames) { machine_.on_message(std::move(frames), channel, monotonic_now()); });
 }
 
-bool ServerSession::send(Channel channel, Frames frames) {
+bool ServerSession::send(Channel channel, Frames&& frames) {
     DealerSocket& socket = channel == Channel::monitor ? link_->monitor : link_->frames;
     return socket.send(std::move(frames)) == SendOutcome::delivered;
 }

@@ -97,6 +97,8 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"samples_per_pixel_mean", figures.samples_per_pixel.mean},
               {"samples_per_pixel_max", figures.samples_per_pixel.max},
               {"quantum_exponent", state.settings.quantum.exponent},
+              {"wire", std::string(name_of(state.settings.wire))},
+              {"reproducible", state.settings.wire == WireFormat::exact},
               {"servers", servers_json(store)},
               {"client",
                {{"samples", local ? local->total(Counter::samples) : 0},

@@ -14,7 +14,7 @@ namespace pathscope {
 namespace {
 
 /// How people know an entry of the render state.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 17> k_names{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 18> k_names{{
     {"scene", "scene"},
     {"files", "content of OBJ, MTL or texture files"},
     {"material", "--material"},
@@ -32,6 +32,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 17> k_names{
     {"bounces", "--bounces"},
     {"filter", "--filter, its kind or its size"},
     {"quantum", "step of exact sums"},
+    {"wire", "--wire"},
 }};
 constexpr std::array<std::string_view, 2> k_free{"spp", "direct_spp"};
 constexpr std::size_t k_longest_shown = 40;

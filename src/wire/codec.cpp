@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <memory>
+#include <optional>
 
 #include "pathscope/core/check.hpp"
 
@@ -15,22 +18,25 @@ namespace {
 
 constexpr std::size_t k_word_bytes = 8;
 constexpr int k_zstd_level = 1;
-static_assert(std::endian::native == std::endian::little, "transpose() takes the first byte for the lowest");
+static_assert(std::endian::native == std::endian::little, "the first byte of a word is taken for its lowest");
 
-/// Byte i of word j becomes byte j of word i, by exchanging halves, quarters and single bytes across the diagonal.
-void transpose(std::uint64_t (&m)[k_word_bytes]) {
-    const auto exchange = [&m](std::size_t distance, std::uint64_t low_bytes) {
-        const std::size_t bits = 8 * distance;
-        for (std::size_t i = 0; i < k_word_bytes; ++i) {
-            if (i & distance) continue;
-            const std::uint64_t swapped = ((m[i] >> bits) ^ m[i + distance]) & low_bytes;
-            m[i] ^= swapped << bits;
-            m[i + distance] ^= swapped;
-        }
-    };
-    exchange(4, 0x00000000ffffffff);
-    exchange(2, 0x0000ffff0000ffff);
-    exchange(1, 0x00ff00ff00ff00ff);
+/// Eight vectors of sixteen bytes, shuffled as a deck of cards is: the first of the lower half, the first of the upper half,
+/// the second of the lower half... The number of a byte's place has seven bits, and this turns them left by one. As planes,
+/// the number is [byte of the word : 3 bits][word : 4 bits]; as words it is [word][byte]. So three shuffles make words of
+/// planes, and four, which complete the circle, planes of words.
+using Bytes16 = std::uint8_t __attribute__((vector_size(16)));
+constexpr std::size_t k_words_at_once = sizeof(Bytes16);
+
+void shuffle_deck(Bytes16 (&deck)[k_word_bytes]) {
+    constexpr std::size_t k_half = k_word_bytes / 2;
+    Bytes16 out[k_word_bytes];
+    for (std::size_t i = 0; i < k_half; ++i) {
+        const Bytes16 a = deck[i], b = deck[i + k_half];
+        out[2 * i] = __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+        out[2 * i + 1] =
+            __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    }
+    std::copy(std::begin(out), std::end(out), std::begin(deck));
 }
 
 /// Where byte `byte` of word `word` lies once all bytes of a kind lie together.
@@ -39,18 +45,18 @@ struct Planes {
     [[nodiscard]] std::size_t place(std::size_t word, std::size_t byte) const { return byte * count + word; }
 };
 
-/// Eight words at a time; those that are left over, byte by byte.
+/// Sixteen words at a time; those that are left over, byte by byte.
 std::string shuffle(std::string_view words) {
     const std::size_t count = words.size() / k_word_bytes;
     const Planes planes{count};
     std::string out(words.size(), '\0');
-    std::uint64_t m[k_word_bytes];
+    Bytes16 deck[k_word_bytes];
     std::size_t word = 0;
-    for (; word + k_word_bytes <= count; word += k_word_bytes) {
-        std::memcpy(m, words.data() + word * k_word_bytes, sizeof m);
-        transpose(m);
+    for (; word + k_words_at_once <= count; word += k_words_at_once) {
+        std::memcpy(deck, words.data() + word * k_word_bytes, sizeof deck);
+        for (int time = 0; time < 4; ++time) shuffle_deck(deck);
         for (std::size_t byte = 0; byte < k_word_bytes; ++byte)
-            std::memcpy(out.data() + planes.place(word, byte), &m[byte], k_word_bytes);
+            std::memcpy(out.data() + planes.place(word, byte), &deck[byte], sizeof deck[byte]);
     }
     for (; word < count; ++word)
         for (std::size_t byte = 0; byte < k_word_bytes; ++byte)
@@ -58,22 +64,20 @@ std::string shuffle(std::string_view words) {
     return out;
 }
 
-std::string unshuffle(std::string_view bytes) {
+void unshuffle(std::string_view bytes, std::span<char> out) {
     const std::size_t count = bytes.size() / k_word_bytes;
     const Planes planes{count};
-    std::string out(bytes.size(), '\0');
-    std::uint64_t m[k_word_bytes];
+    Bytes16 deck[k_word_bytes];
     std::size_t word = 0;
-    for (; word + k_word_bytes <= count; word += k_word_bytes) {
+    for (; word + k_words_at_once <= count; word += k_words_at_once) {
         for (std::size_t byte = 0; byte < k_word_bytes; ++byte)
-            std::memcpy(&m[byte], bytes.data() + planes.place(word, byte), k_word_bytes);
-        transpose(m);
-        std::memcpy(out.data() + word * k_word_bytes, m, sizeof m);
+            std::memcpy(&deck[byte], bytes.data() + planes.place(word, byte), sizeof deck[byte]);
+        for (int time = 0; time < 3; ++time) shuffle_deck(deck);
+        std::memcpy(out.data() + word * k_word_bytes, deck, sizeof deck);
     }
     for (; word < count; ++word)
         for (std::size_t byte = 0; byte < k_word_bytes; ++byte)
             out[word * k_word_bytes + byte] = bytes[planes.place(word, byte)];
-    return out;
 }
 
 /// Made once for each thread: it is a megabyte to compress and a tenth of it to decompress, which would cost more than
@@ -92,54 +96,83 @@ ZSTD_DCtx* decompressor() {
     return context.get();
 }
 
-PackedBytes pack_shuffled(std::string raw) {
-    if (raw.size() % k_word_bytes != 0) return {Codec::raw, std::move(raw)};
-    const std::string planes = shuffle(raw);
-    std::string packed(ZSTD_compressBound(planes.size()), '\0');
-    const std::size_t size = ZSTD_compressCCtx(compressor(), packed.data(), packed.size(), planes.data(),
-                                               planes.size(), k_zstd_level);
-    if (ZSTD_isError(size) || size >= raw.size()) return {Codec::raw, std::move(raw)};
+/// Nothing where it would not save a byte.
+std::optional<std::string> compress(std::string_view bytes) {
+    std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+    const std::size_t size = ZSTD_compressCCtx(compressor(), packed.data(), packed.size(), bytes.data(),
+                                               bytes.size(), k_zstd_level);
+    if (ZSTD_isError(size) || size >= bytes.size()) return std::nullopt;
     packed.resize(size);
-    return {Codec::shuffle_zstd, std::move(packed)};
+    return packed;
 }
 
-Result<std::string> unpack_shuffled(std::string_view packed, std::size_t expected_bytes) {
-    if (expected_bytes % k_word_bytes != 0)
+/// Whether the packed bytes say of themselves that they hold so many. A bomb is refused here, before any memory is taken.
+Result<void> check_claim(Codec codec, std::string_view packed, std::size_t expected_bytes) {
+    if (codec == Codec::raw) {
+        if (packed.size() == expected_bytes) return {};
+        return bad_input(fmt::format("The payload has {} bytes, not {}.", packed.size(), expected_bytes));
+    }
+    if (codec == Codec::shuffle_zstd && expected_bytes % k_word_bytes != 0)
         return bad_input(fmt::format("{} bytes are no whole number of 64-bit words.", expected_bytes));
-    // The frame's own claim is compared before anything is allocated for it: a bomb is refused here.
     const unsigned long long claimed = ZSTD_getFrameContentSize(packed.data(), packed.size());
     if (claimed != expected_bytes)
         return bad_input(
             fmt::format("The Zstandard frame does not state {} bytes as its content size.", expected_bytes));
     if (ZSTD_findFrameCompressedSize(packed.data(), packed.size()) != packed.size())
         return bad_input("The packed bytes are not exactly one Zstandard frame.");
-
-    std::string planes(expected_bytes, '\0');
-    const std::size_t size =
-        ZSTD_decompressDCtx(decompressor(), planes.data(), planes.size(), packed.data(), packed.size());
-    if (ZSTD_isError(size))
-        return bad_input(fmt::format("The Zstandard frame is damaged: {}.", ZSTD_getErrorName(size)));
-    if (size != expected_bytes)
-        return bad_input(fmt::format("The Zstandard frame holds {} bytes, not {}.", size, expected_bytes));
-    return unshuffle(planes);
+    return {};
 }
 
-Result<std::string> unpack_raw(std::string packed, std::size_t expected_bytes) {
-    if (packed.size() != expected_bytes)
-        return bad_input(fmt::format("The payload has {} bytes, not {}.", packed.size(), expected_bytes));
-    return packed;
+/// Requires: check_claim() for the size of `out`.
+Result<void> decompress(std::string_view packed, std::span<char> out) {
+    const std::size_t size =
+        ZSTD_decompressDCtx(decompressor(), out.data(), out.size(), packed.data(), packed.size());
+    if (ZSTD_isError(size))
+        return bad_input(fmt::format("The Zstandard frame is damaged: {}.", ZSTD_getErrorName(size)));
+    if (size != out.size())
+        return bad_input(fmt::format("The Zstandard frame holds {} bytes, not {}.", size, out.size()));
+    return {};
+}
+
+/// Requires: check_claim() for the size of `out`.
+Result<void> decompress_shuffled(std::string_view packed, std::span<char> out) {
+    // Kept from tile to tile: fresh memory for each would cost more than unpacking does.
+    static thread_local std::string planes;
+    planes.resize(out.size());
+    if (auto whole = decompress(packed, planes); !whole) return whole;
+    unshuffle(planes, out);
+    return {};
+}
+
+/// Requires: check_claim() for the size of `out`.
+Result<void> unpack_checked(Codec codec, std::string_view packed, std::span<char> out) {
+    if (codec == Codec::shuffle_zstd) return decompress_shuffled(packed, out);
+    if (codec == Codec::zstd) return decompress(packed, out);
+    std::copy(packed.begin(), packed.end(), out.begin());
+    return {};
 }
 
 }  // namespace
 
-PackedBytes pack_bytes(Codec codec, std::string raw) {
-    if (codec == Codec::shuffle_zstd) return pack_shuffled(std::move(raw));
-    return {Codec::raw, std::move(raw)};
+PackedBytes pack_bytes(Codec codec, std::string_view raw) {
+    const bool has_words = raw.size() % k_word_bytes == 0;
+    std::optional<std::string> packed;
+    if (codec == Codec::shuffle_zstd && has_words) packed = compress(shuffle(raw));
+    if (codec == Codec::zstd) packed = compress(raw);
+    if (packed) return {codec, std::move(*packed)};
+    return {Codec::raw, std::string(raw)};
 }
 
-Result<std::string> unpack_bytes(Codec codec, std::string packed, std::size_t expected_bytes) {
-    if (codec == Codec::shuffle_zstd) return unpack_shuffled(packed, expected_bytes);
-    return unpack_raw(std::move(packed), expected_bytes);
+Result<void> unpack_bytes(Codec codec, std::string_view packed, std::span<char> out) {
+    if (auto claim = check_claim(codec, packed, out.size()); !claim) return claim;
+    return unpack_checked(codec, packed, out);
+}
+
+Result<std::string> unpack_bytes(Codec codec, std::string_view packed, std::size_t expected_bytes) {
+    if (const auto claim = check_claim(codec, packed, expected_bytes); !claim) return claim.error();
+    std::string out(expected_bytes, '\0');
+    if (const auto unpacked = unpack_checked(codec, packed, out); !unpacked) return unpacked.error();
+    return out;
 }
 
 }  // namespace pathscope

@@ -126,7 +126,7 @@ class ClientScript : private ClientWorld {
         CHECK(bool(decoded) && std::holds_alternative<message::Tile>(*decoded));
         auto& tile = *std::get_if<message::Tile>(&*decoded);
         const PixelRect rect = machine_.work().rect_of(tile.unit);
-        const auto sums = block_result(std::move(tile), rect.area());
+        const auto sums = block_result(tile, rect.area(), machine_.state().settings.wire);
         CHECK(bool(sums), sums.error().message);
         add(indirect_, rect, *sums);
     }
@@ -168,7 +168,7 @@ class ClientScript : private ClientWorld {
         tile.rays = result.rays;
         tile.samples = result.samples;
         tile.render_ns = k_millisecond_ns;
-        put_block_result(tile, result.sums);
+        put_block_result(tile, result.sums, machine_.state().settings.wire);
         return tile;
     }
     void tile() {
@@ -218,8 +218,9 @@ class ClientScript : private ClientWorld {
                 break;
             case 10: {
                 const auto quanta = std::int64_t(in_.number());
-                put_block_result(
-                    tile, std::vector<PixelSum>(std::size_t(sent.lease.rect.area()), {quanta, 0, quanta}));
+                const std::vector<PixelSum> sums(std::size_t(sent.lease.rect.area()), {quanta, 0, quanta});
+                const WireFormat any = k_wire_format_names[in_.below(k_wire_format_names.size())].value;
+                put_block_result(tile, sums, quanta < 0 ? WireFormat::exact : any);
                 break;
             }
             case 11:

@@ -51,8 +51,8 @@ class ServerScript : private ServerWorld {
   private:
     // ---- The world.
 
-    bool send(Channel channel, Frames frames) override {
-        const Decoded decoded = decode(std::move(frames), Role::client, channel);
+    bool send(Channel channel, Frames&& frames) override {
+        const Decoded decoded = decode(frames, Role::client, channel);
         CHECK(bool(decoded), decoded.error().sentence);
         return reachable_;
     }

@@ -51,6 +51,8 @@ inline RenderState make_small_state(std::size_t number) {
     state.settings.direct_spp = 2;
     state.settings.seed = std::uint32_t(number);
     state.options.smoothing = number != 5;
+    if (number == 2) state.settings.wire = WireFormat::half;
+    if (number == 3) state.settings.wire = WireFormat::shared;
     if (number == 5) state.settings.filter = FilterPlace::client;
     return state;
 }

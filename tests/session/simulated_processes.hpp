@@ -159,7 +159,7 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         });
     }
 
-    bool send(Channel channel, Frames frames) override {
+    bool send(Channel channel, Frames&& frames) override {
         cluster_.to_client(*this, channel, std::move(frames));
         return true;
     }

@@ -12,7 +12,7 @@ namespace {
 /// A world in which rounds end at once, and whose network can be stopped.
 class StoppableWorld : public ServerWorld {
   public:
-    bool send(Channel, Frames frames) override {
+    bool send(Channel, Frames&& frames) override {
         if (stopped) return false;
         sent.push_back(std::move(frames));
         return true;

@@ -54,6 +54,8 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
                             "bad_messages",
                             "leases_expired",
                             "reallocated",
+                            "tile_bytes",
+                            "tile_bytes_unpacked",
                             "bytes_in",
                             "bytes_out",
                             "nonfinite_dropped",
@@ -64,6 +66,8 @@ TEST_CASE("the statistics hold every key that scripts read, before anything has 
     CHECK(json["height"] == 40);
     CHECK(json["spp"] == 8);
     CHECK(json["seed"] == 7);
+    CHECK(json["wire"] == "exact");
+    CHECK(json["reproducible"] == true);
     CHECK(json["servers"] == Json::array());
     CHECK(json["estimated_error"].is_null());
     CHECK(json["rays_per_s"] == 0);  // And not a division by no time, which JSON cannot say.

@@ -85,6 +85,8 @@ void add_levers(CLI::App& app, RenderOptions& options) {
                                options.settings.atrous.levels))
         ->check(CLI::Range(0, k_max_atrous_levels))
         ->type_name("N");
+    add_lever(app, "--wire", options.settings.wire,
+              "in what form light comes from servers; only exact keeps every bit");
 }
 
 void add_cluster_options(CLI::App& app, RenderOptions& options) {
@@ -204,6 +206,7 @@ Result<void> check_strategy(const RenderOptions& options) {
     const char* const other = options.client.sampling.adaptive                        ? "--adaptive on"
                               : options.client.sampling.target_error > 0              ? "--target-error"
                               : options.checkpoint.write || options.checkpoint.resume ? "a checkpoint"
+                              : options.settings.wire != WireFormat::exact            ? "--wire"
                                                                                       : nullptr;
     if (!other) return {};
     return bad_input(fmt::format("--strategy {}: it does not go together with {}.",

@@ -168,6 +168,9 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
     const auto metrics = open_metrics(options, store);
     if (!metrics) return metrics.error();
+    if (state->settings.wire != WireFormat::exact)
+        log_note(fmt::format("With --wire {} light loses bits on its way: this image is not reproducible.",
+                             name_of(state->settings.wire)));
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
     auto session =
         ClientSession::create(complete_config(options),

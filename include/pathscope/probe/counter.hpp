@@ -15,16 +15,18 @@ enum class Counter {
     rounds_committed,  ///< Counted into the image, each once.
     leases_granted,
     leases_expired,
-    reallocated,         ///< Rounds given again, to another server than the last.
-    speculated,          ///< Second leases on a straggler's round.
-    duplicates_dropped,  ///< Results of rounds that were committed already.
-    stale_dropped,       ///< Results of an old epoch.
-    refused_results,     ///< Results that belong to no lease, or not to the lease they name.
-    bad_messages,        ///< Malformed, oversized, out of place, unauthorised.
-    refused_peers,       ///< Connections turned away before a message of theirs was read.
-    nonfinite_dropped,   ///< Samples whose radiance was not finite or negative.
-    samples,             ///< Of pixels, merged; rounds_committed counts what they came in.
-    tiles,               ///< Results of servers that were merged.
+    reallocated,          ///< Rounds given again, to another server than the last.
+    speculated,           ///< Second leases on a straggler's round.
+    duplicates_dropped,   ///< Results of rounds that were committed already.
+    stale_dropped,        ///< Results of an old epoch.
+    refused_results,      ///< Results that belong to no lease, or not to the lease they name.
+    bad_messages,         ///< Malformed, oversized, out of place, unauthorised.
+    refused_peers,        ///< Connections turned away before a message of theirs was read.
+    nonfinite_dropped,    ///< Samples whose radiance was not finite or negative.
+    samples,              ///< Of pixels, merged; rounds_committed counts what they came in.
+    tiles,                ///< Results of servers that were merged.
+    tile_bytes,           ///< Their payloads as they came...
+    tile_bytes_unpacked,  ///< ...and unpacked.
     rays,
     bytes_in,
     bytes_out,
@@ -49,6 +51,8 @@ inline constexpr std::array k_counter_names{
     EnumName{Counter::nonfinite_dropped, "nonfinite_dropped"},
     EnumName{Counter::samples, "samples"},
     EnumName{Counter::tiles, "tiles"},
+    EnumName{Counter::tile_bytes, "tile_bytes"},
+    EnumName{Counter::tile_bytes_unpacked, "tile_bytes_unpacked"},
     EnumName{Counter::rays, "rays"},
     EnumName{Counter::bytes_in, "bytes_in"},
     EnumName{Counter::bytes_out, "bytes_out"},

@@ -2,8 +2,9 @@
 /// The result of the strategy `blocks`: sums of the pixels of a rectangle. docs/protocol.md, section 5.4.
 ///
 ///     server:  put_block_result(tile, sums);              // sets codec, raw_bytes, hash, result
-///     client:  block_result(std::move(tile), rect.area()) // checks all four, gives the sums back
+///     client:  read_block_result(tile, sums);             // checks all four, gives the sums back
 ///
+/// The hash is that of the payload as it travels: what was damaged on its way is refused before it is unpacked.
 /// Layout before packing: pixels row by row, for each three int64 little-endian (red, green, blue), in
 /// quanta.
 /// Ensures: sums that come back are in range for the tile's count (image/exact_sum.hpp), so that they may be
@@ -17,6 +18,7 @@
 
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/exact_sum.hpp"
+#include "pathscope/image/wire_format.hpp"
 #include "pathscope/protocol/message.hpp"
 #include "pathscope/wire/codec.hpp"
 
@@ -25,8 +27,17 @@ namespace pathscope {
 inline constexpr std::string_view k_blocks_strategy = "blocks";
 
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec = Codec::shuffle_zstd);
+/// The same in a format that may lose bits (image/wire_format.hpp).
+void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, WireFormat format);
 
-/// `pixels` is what the lease says, not the tile. The sentence of the error names what does not fit.
-[[nodiscard]] Result<std::vector<PixelSum>> block_result(message::Tile tile, std::int64_t pixels);
+/// One sum for each pixel that the lease names, whatever the tile says. After an error `sums` may hold anything; the
+/// sentence names what does not fit. Into memory of the caller's, since a client reads tens of thousands in a second.
+/// A tile that lost bits is refused unless its format is the one that was agreed on.
+[[nodiscard]] Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> sums,
+                                             WireFormat agreed = WireFormat::exact);
+
+/// The same, into new memory.
+[[nodiscard]] Result<std::vector<PixelSum>> block_result(const message::Tile& tile, std::int64_t pixels,
+                                                         WireFormat agreed = WireFormat::exact);
 
 }  // namespace pathscope

@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "pathscope/core/enum_names.hpp"
@@ -41,8 +42,10 @@ constexpr const auto& enum_table(Strategy) { return k_strategy_names; }
 [[nodiscard]] std::vector<PixelSum> flat_sums(const PixelRect& rect, std::uint32_t first,
                                               std::uint32_t count);
 
-/// What the tile holds, checked by all that is known about the strategy; `rect` is what the lease says.
-[[nodiscard]] Result<std::vector<PixelSum>> strategy_result(Strategy strategy, message::Tile tile,
-                                                            const PixelRect& rect);
+/// One sum for each pixel of `rect`, which is what the lease says, checked by all that is known about the strategy. After an
+/// error `sums` may hold anything. A tile that lost bits is refused unless its format is the one that was agreed on.
+[[nodiscard]] Result<void> read_strategy_result(Strategy strategy, const message::Tile& tile,
+                                                const PixelRect& rect, std::span<PixelSum> sums,
+                                                WireFormat agreed = WireFormat::exact);
 
 }  // namespace pathscope

@@ -12,6 +12,7 @@
 #include "pathscope/filter/atrous.hpp"
 #include "pathscope/filter/joint_bilateral.hpp"
 #include "pathscope/image/exact_sum.hpp"
+#include "pathscope/image/wire_format.hpp"
 #include "pathscope/integrator/settings.hpp"
 
 namespace pathscope {
@@ -41,9 +42,10 @@ struct RenderSettings {
     TransportSettings transport;
     FilterPlace filter = FilterPlace::off;
     FilterKind filter_kind = FilterKind::joint;
-    BilateralParams bilateral;  ///< Of FilterKind::joint.
-    AtrousParams atrous;        ///< Of FilterKind::atrous.
-    Quantum quantum;            ///< Step of the exact sums; from quantum_for() of the scene.
+    BilateralParams bilateral;            ///< Of FilterKind::joint.
+    AtrousParams atrous;                  ///< Of FilterKind::atrous.
+    Quantum quantum;                      ///< Step of the exact sums; from quantum_for() of the scene.
+    WireFormat wire = WireFormat::exact;  ///< Of sums that come from servers; all but exact lose bits.
 
     friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };

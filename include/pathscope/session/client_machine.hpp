@@ -236,6 +236,7 @@ class ClientMachine {
     TimeNs next_probe_ = 0;
 
     FrameWork work_;
+    std::vector<PixelSum> arrived_;  ///< Of the tile at hand: its memory serves for all.
     std::uint64_t last_ticket_ = 0;
     std::map<std::uint64_t, LocalWork> local_work_;  ///< In the client's renderer, by ticket.
     std::uint64_t saturated_ = 0;

@@ -18,6 +18,7 @@
 
 #include "pathscope/core/clock.hpp"
 #include "pathscope/core/result.hpp"
+#include "pathscope/protocol/block_result.hpp"
 #include "pathscope/protocol/codec.hpp"
 #include "pathscope/session/render_state.hpp"
 #include "pathscope/session/round_runner.hpp"
@@ -46,8 +47,13 @@ class ServerWorld {
   public:
     virtual ~ServerWorld() = default;
 
-    /// To the client, on monitor or frames. False if it did not leave.
-    virtual bool send(Channel channel, Frames frames) = 0;
+    /// To the client, on monitor or frames. False if it did not leave: then the frames are still there.
+    virtual bool send(Channel channel, Frames&& frames) = 0;
+
+    /// Puts the result of a round into its tile.
+    virtual void pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+        put_block_result(tile, result.sums, format);
+    }
 
     /// Begins a round. Each has one outcome: on_outcome(). A cancelled one has it soon.
     virtual void begin(RoundJob job) = 0;
@@ -185,7 +191,7 @@ class ServerMachine {
     std::shared_ptr<const Scene> scene_;
     std::map<std::uint64_t, message::Lease> leases_;  ///< Those being rendered, by ticket.
     std::uint64_t last_ticket_ = 0;  ///< Lease numbers repeat from client to client, tickets do not.
-    std::deque<Message>
+    std::deque<Frames>
         unsent_answers_;  ///< TILE and NACK that the socket would not take yet; bounded by credits.
     std::uint64_t samples_done_ = 0;
 };

@@ -67,7 +67,7 @@ class ServerSession : private ServerWorld {
     void say_goodbye();
 
     // The world, as the machine sees it.
-    bool send(Channel channel, Frames frames) override;
+    bool send(Channel channel, Frames&& frames) override;
     void begin(RoundJob job) override { runner_.begin(std::move(job)); }
     void cancel(std::uint64_t ticket) override { runner_.cancel(ticket); }
     void cancel_all() override { runner_.cancel_all(); }

@@ -2,6 +2,7 @@
 /// Pixel codecs: how the sums of a tile become fewer bytes, without losing a bit.
 ///
 ///   raw           the bytes themselves
+///   zstd          one frame of Zstandard at level 1
 ///   shuffle-zstd  bytes of 64-bit words sorted by significance, then Zstandard at level 1
 ///
 /// Why shuffle: a sum of samples fills perhaps 30 of its 64 bits. Sorted by significance, the empty bytes of
@@ -15,6 +16,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -23,9 +25,10 @@
 
 namespace pathscope {
 
-enum class Codec { raw, shuffle_zstd };
+enum class Codec { raw, shuffle_zstd, zstd };
 inline constexpr std::array k_codec_names{EnumName<Codec>{Codec::raw, "raw"},
-                                          EnumName<Codec>{Codec::shuffle_zstd, "shuffle-zstd"}};
+                                          EnumName<Codec>{Codec::shuffle_zstd, "shuffle-zstd"},
+                                          EnumName<Codec>{Codec::zstd, "zstd"}};
 constexpr const auto& enum_table(Codec) { return k_codec_names; }
 
 struct PackedBytes {
@@ -34,9 +37,13 @@ struct PackedBytes {
 };
 
 /// Takes any bytes; shuffle_zstd falls back to raw unless the size is a multiple of 8.
-[[nodiscard]] PackedBytes pack_bytes(Codec codec, std::string raw);
+[[nodiscard]] PackedBytes pack_bytes(Codec codec, std::string_view raw);
 
 /// Requires: expected_bytes is the receiver's own expectation, bounded by it, and not a figure from the wire.
-[[nodiscard]] Result<std::string> unpack_bytes(Codec codec, std::string packed, std::size_t expected_bytes);
+[[nodiscard]] Result<std::string> unpack_bytes(Codec codec, std::string_view packed,
+                                               std::size_t expected_bytes);
+
+/// Into memory that is there already, of the size expected. After an error it may hold anything.
+[[nodiscard]] Result<void> unpack_bytes(Codec codec, std::string_view packed, std::span<char> out);
 
 }  // namespace pathscope
