@@ -1,9 +1,9 @@
 """The simulation must be able to fail: bugs are put in on purpose, one at a time, and each must break a world. So must the tests
 of the classic system's defects, S1 to S13 of docs/testing.md: where a few words bring the defect back, its test must fail.
 
-    test_mutants.py BUILD      BUILD: a configured build folder with test_session in it
+    test_mutants.py BUILD      BUILD: a configured build folder with test_session and test_protocol in it
 
-A mutant is one source file with a few words changed, compiled as the build compiles it and linked into test_session before
+A mutant is one source file with a few words changed, compiled as the build compiles it and linked into the test before
 the library that holds the sound one. Within 100 seeds (a few more where said) some world must break.
 """
 import os
@@ -26,8 +26,8 @@ SERVER = "src/session/server_machine.cpp"
 SERVER_STATE = "src/session/server_state.cpp"
 
 
-def ninja_commands():
-    text = subprocess.run(["ninja", "-C", BUILD, "-t", "commands", "test_session"], check=True,
+def ninja_commands(target):
+    text = subprocess.run(["ninja", "-C", BUILD, "-t", "commands", target], check=True,
                           capture_output=True, text=True).stdout
     return text.splitlines()
 
@@ -41,8 +41,8 @@ def compile_command(commands, source, mutant, out):
     return [*words, f"-I{pathlib.Path(source).resolve().parent}"]
 
 
-def link_command(commands, extra, out):
-    line = next(line for line in reversed(commands) if " -o test_session " in line)
+def link_command(commands, target, extra, out):
+    line = next(line for line in reversed(commands) if f" -o {target} " in line)
     words = shlex.split(re.sub(r"^: && | && :$", "", line))
     words[words.index("-o") + 1] = str(out)
     first_object = next(i for i, word in enumerate(words) if word.endswith(".o"))
@@ -51,7 +51,7 @@ def link_command(commands, extra, out):
 
 def failed_tests(program, pattern):
     """Of those whose name fits. A program that stops at a CHECK of its own has noticed as well."""
-    run = subprocess.run([program, "-tc=" + pattern], capture_output=True, text=True, timeout=PATIENCE_S)
+    run = subprocess.run([program, "-tc=" + pattern], capture_output=True, text=True, errors="replace", timeout=PATIENCE_S)
     if "bug:" in run.stderr + run.stdout:
         return 1
     found = re.search(r"test cases: +(\d+) \| +\d+ passed \| +(\d+) failed", run.stdout)
@@ -76,9 +76,9 @@ def broken_worlds(program, seeds, variables):
 class Mutants(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.commands = ninja_commands()
+        cls.commands = {target: ninja_commands(target) for target in ("test_session", "test_protocol")}
 
-    def verdict_on(self, source, changes, judge):
+    def verdict_on(self, source, changes, judge, target="test_session"):
         """What `judge` says of the program with the changes."""
         text = pathlib.Path(source).read_text()
         for sound, broken in changes:
@@ -87,8 +87,8 @@ class Mutants(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             mutant, compiled, program = (pathlib.Path(folder) / name for name in ("mutant.cpp", "m.o", "t"))
             mutant.write_text(text)
-            for command in (compile_command(self.commands, source, mutant, compiled),
-                            link_command(self.commands, compiled, program)):
+            for command in (compile_command(self.commands[target], source, mutant, compiled),
+                            link_command(self.commands[target], target, compiled, program)):
                 subprocess.run(command, cwd=BUILD, check=True, capture_output=True, text=True)
             return judge(program)
 
@@ -144,13 +144,14 @@ class Mutants(unittest.TestCase):
         self.check(SERVER_STATE, ("    if (send_monitor(message::SnapshotRequest{",
                                   "    if (!held_ && send_monitor(message::SnapshotRequest{"))
 
-    def check_defect(self, number, source, *changes):
-        failed = self.verdict_on(source, changes, lambda program: failed_tests(program, f"S{number}:*"))
+    def check_defect(self, number, source, *changes, target="test_session"):
+        failed = self.verdict_on(source, changes, lambda program: failed_tests(program, f"S{number}:*"), target)
         print(f"S{number}: {failed} tests failed")
         self.assertGreater(failed, 0)
 
     def test_S0_the_sound_program_has_no_defect(self):
-        self.assertEqual(failed_tests(BUILD / "test_session", "S*:*"), 0)
+        for target in self.commands:
+            self.assertEqual(failed_tests(BUILD / target, "S*:*"), 0)
 
     def test_S1_a_death_restarts_all(self):
         self.check_defect(1, "src/session/client_joining.cpp",
@@ -164,6 +165,17 @@ class Mutants(unittest.TestCase):
 
     def test_S3_nobody_tells_a_server_that_it_was_given_up(self):
         self.check_defect(3, CLIENT, ("    send(Channel::monitor, instance, message::Who{});\n", ""))
+
+    def test_S4_two_bytes_are_an_order_to_end(self):
+        self.check_defect(4, "src/protocol/decode.cpp",
+                          ("    if (frames.size() < 2 || ",
+                           "    if (frames.size() == 1 && frames[0].size() == 2) return Message(message::Bye{ByeReason::stop, {}});\n"
+                           "    if (frames.size() < 2 || "), target="test_protocol")
+
+    def test_S6_a_number_has_the_width_of_a_machine(self):
+        self.check_defect(6, "src/wire/message_pack.cpp",
+                          ("prefixed(prefix::uint16, static_cast<std::uint16_t>(value));", "prefixed(prefix::uint32, static_cast<std::uint32_t>(value));"),
+                          target="test_protocol")
 
     def test_S5_a_server_goes_on_with_the_view_it_has(self):
         self.check_defect(5, SERVER_STATE, ("    if (send_monitor(message::SnapshotRequest{", "    if (!held_ && send_monitor(message::SnapshotRequest{"))
