@@ -80,6 +80,7 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"direct_spp", state.settings.direct_spp},
               {"seed", state.settings.seed},
               {"threads", figures.threads},
+              {"strategy", name_of(figures.strategy)},
               {"wall_s", figures.wall_s},
               {"load_s", figures.load_s},
               {"build_s", figures.build_s},

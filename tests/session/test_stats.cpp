@@ -121,6 +121,7 @@ TEST_CASE("the numbers are those of the store, each counter under its own key") 
     CHECK(json["build_s"] == 2.5);
     CHECK(json["render_s"] == 4);
     CHECK(json["threads"] == 3);
+    CHECK(json["strategy"] == "blocks");
     CHECK(json["triangles"] == 10);
     CHECK(json["mesh_bytes_per_triangle"] == 45);
     CHECK(json["bvh_bytes_per_triangle"] == 72);

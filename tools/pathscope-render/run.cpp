@@ -203,6 +203,7 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     figures.build_s = to_seconds(built - loaded);
     figures.render_s = earlier.render_s + to_seconds(rendered - built);
     figures.threads = options.client.threads > 0 ? options.client.threads : hardware_threads();
+    figures.strategy = options.client.strategy;
     figures.memory = memory_of(*shared_scene);
     figures.image_hash = image_hash(buffers.frame.combined);
     figures.estimated_error = work.estimated_error();

@@ -14,6 +14,7 @@
 #include "pathscope/image/dropped_sample.hpp"
 #include "pathscope/image/image.hpp"
 #include "pathscope/probe/event_store.hpp"
+#include "pathscope/protocol/strategy.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/render_state.hpp"
@@ -40,6 +41,7 @@ struct RunFigures {
     double wall_s = 0, load_s = 0, build_s = 0;
     double render_s = 0;  ///< Of all runs that worked on the frame, as all counters of the totals.
     int threads = 0;
+    Strategy strategy = Strategy::blocks;  ///< With another one the picture is none.
     SceneMemory memory;
     Digest image_hash{};
     std::optional<double> estimated_error;  ///< Relative; nothing when it was not asked for.
