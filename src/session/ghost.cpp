@@ -208,7 +208,7 @@ void GhostHost::Ghost::leave() {
     if (machine_.linked()) machine_.say_goodbye(monotonic_now());
 }
 
-void GhostHost::Ghost::pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+void GhostHost::Ghost::fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const {
     static thread_local PackedNoise noise;
     const message::Tile& packed = noise.of(std::size_t(result.samples / tile.count), format,
                                            hash_combine(hash_u32(tile.unit), tile.first));

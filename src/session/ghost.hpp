@@ -82,7 +82,7 @@ class GhostHost::Ghost : private ServerWorld {
 
     // The world, as the machine sees it.
     bool send(Channel channel, Frames&& frames) override;
-    void pack(message::Tile& tile, const RoundResult& result, WireFormat format) const override;
+    void fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const override;
     void begin(RoundJob job) override { renderer_.begin(job, monotonic_now()); }
     void cancel(std::uint64_t ticket) override { renderer_.cancel(ticket); }
     void cancel_all() override { renderer_.cancel_all(); }

@@ -84,7 +84,7 @@ void ServerMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
     tile.dropped = result.dropped;
     tile.dropped_count = std::uint32_t(result.dropped_count);
     tile.saturated_count = std::uint32_t(result.saturated_count);
-    world_.pack(tile, result, held_->state.settings.wire);
+    world_.fill_tile(tile, result, held_->state.settings.wire);
     send_answer(std::move(tile));
 }
 

@@ -51,7 +51,7 @@ class ServerWorld {
     virtual bool send(Channel channel, Frames&& frames) = 0;
 
     /// Puts the result of a round into its tile.
-    virtual void pack(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+    virtual void fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const {
         put_block_result(tile, result.sums, format);
     }
 
