@@ -17,6 +17,10 @@ static_assert(std::endian::native == std::endian::little && sizeof(PixelSum) == 
 
 }  // namespace
 
+Digest hash_of_sums(std::span<const PixelSum> sums) {
+    return hash_text({reinterpret_cast<const char*>(sums.data()), sums.size_bytes()});
+}
+
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec) {
     CHECK(sums.size_bytes() <= k_max_tile_bytes, sums.size());
     std::string raw(reinterpret_cast<const char*>(sums.data()), sums.size_bytes());

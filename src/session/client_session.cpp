@@ -138,7 +138,8 @@ void ClientSession::step(TimeNs max_wait) {
 
 void ClientSession::receive(RouterSocket& socket, Channel channel) {
     drain(socket, k_messages_per_turn, [&](RoutedMessage message) {
-        machine_.on_message(message.peer, std::move(message.frames), channel, monotonic_now());
+        const Sender sender{std::move(message.key), std::move(message.address)};
+        machine_.on_message(message.peer, std::move(message.frames), channel, monotonic_now(), sender);
     });
 }
 

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pathscope/core/hash.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/exact_sum.hpp"
 #include "pathscope/protocol/message.hpp"
@@ -23,6 +24,9 @@
 namespace pathscope {
 
 inline constexpr std::string_view k_blocks_strategy = "blocks";
+
+/// The same as TILE's field `hash`: equal sums have equal hashes.
+[[nodiscard]] Digest hash_of_sums(std::span<const PixelSum> sums);
 
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec = Codec::shuffle_zstd);
 

@@ -72,6 +72,8 @@ class ServerMachine {
     void on_linked(std::string instance, TimeNs now);
     /// The client's door did not let it in, and told so on the connection itself: new sockets are needed.
     void on_refused(TimeNs now);
+    /// The connection to the client ended, and ZeroMQ makes another one: whoever answers there next may know of no ban.
+    void on_connection_lost(TimeNs now);
     void on_message(Frames frames, Channel channel, TimeNs now);
     void on_outcome(RoundOutcome& outcome, TimeNs now);
     void on_loaded(LoadedScene& loaded, TimeNs now);
@@ -171,6 +173,7 @@ class ServerMachine {
     // Timers.
     TimeNs last_heard_ = 0;
     TimeNs next_hello_ = 0;
+    TimeNs banned_until_ = 0;  ///< The client said so; it hears nothing before.
     TimeNs hello_pause_ = 0;
     TimeNs next_ping_ = 0;
     std::optional<TimeNs> missed_since_;  ///< A PING told of an INPUT that has not come.
