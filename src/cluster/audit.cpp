@@ -19,7 +19,7 @@ std::uint64_t mix(std::uint64_t z) {
 void Audit::begin() {
     items_.clear();
     open_.clear();
-    disputed_.clear();
+    for_client_.clear();
     leases_.clear();
     deadlines_.clear();
     stopped_ = false;
@@ -55,6 +55,7 @@ void Audit::grant(const AuditedRound& granted, const Lease& lease) {
     open->second.erase(granted.round);
     if (open->second.empty()) open_.erase(open);
     item.lease = lease;
+    ++item.attempts;
     leases_.emplace(lease.id, granted.round);
     deadlines_.emplace(lease.deadline, lease.id);
 }
@@ -76,7 +77,7 @@ bool Audit::on_opinion(const ResultClaim& claim, const Digest& result) {
         return true;
     }
     item.opinion.emplace(claim.server, result);
-    disputed_.insert(entry->first);
+    for_client_.insert(entry->first);
     return false;
 }
 
@@ -90,8 +91,8 @@ Audit::Items::iterator Audit::reopen(Items::iterator entry) {
     Item& item = entry->second;
     if (item.lease) end_lease(item);
     item.at_client = false;
-    if (item.opinion)
-        disputed_.insert(entry->first);
+    if (item.is_for_client())
+        for_client_.insert(entry->first);
     else if (stopped_)
         return erase(entry);
     else
@@ -126,7 +127,7 @@ std::optional<TimeNs> Audit::next_deadline() const {
 // ---- The client's own.
 
 std::optional<AuditedRound> Audit::next_for_client(const std::function<bool(ServerId)>& nobody_else) const {
-    if (!disputed_.empty()) return round_of(*items_.find(*disputed_.begin()));
+    if (!for_client_.empty()) return round_of(*items_.find(*for_client_.begin()));
     for (const auto& [author, rounds] : open_)
         if (nobody_else(author)) return round_of(*items_.find(*rounds.begin()));
     return std::nullopt;
@@ -136,10 +137,7 @@ void Audit::grant_to_client(RoundKey round) {
     Item& item = items_.at(round);
     CHECK(!item.lease && !item.at_client);
     item.at_client = true;
-    if (item.opinion) {
-        disputed_.erase(round);
-        return;
-    }
+    if (for_client_.erase(round) > 0) return;
     const auto open = open_.find(item.author);
     open->second.erase(round);
     if (open->second.empty()) open_.erase(open);
@@ -164,7 +162,7 @@ std::vector<ServerId> Audit::on_truth(RoundKey round, const Digest& result) {
 
 Audit::Items::iterator Audit::erase(Items::iterator entry) {
     if (entry->second.lease) end_lease(entry->second);
-    disputed_.erase(entry->first);
+    for_client_.erase(entry->first);
     if (const auto open = open_.find(entry->second.author); open != open_.end()) {
         open->second.erase(entry->first);
         if (open->second.empty()) open_.erase(open);
@@ -183,7 +181,7 @@ std::vector<Lease> Audit::forget(std::uint32_t unit) {
 
 void Audit::stop() {
     if (std::exchange(stopped_, true)) return;
-    for (auto it = items_.begin(); it != items_.end();) it = it->second.open() ? erase(it) : std::next(it);
+    for (auto it = items_.begin(); it != items_.end();) it = it->second.open() && !it->second.is_for_client() ? erase(it) : std::next(it);
 }
 
 }  // namespace pathscope

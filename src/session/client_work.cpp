@@ -105,7 +105,7 @@ bool ClientMachine::grant_to(Server& server) {
     };
     std::optional<Lease> lease;
     if (const auto item = audit_.next_for(id))  // First: the sooner a liar is found, the less is to be undone.
-        lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), 0));
+        lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
     if (!lease) lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.

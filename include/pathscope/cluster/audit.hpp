@@ -45,11 +45,14 @@ struct AuditedRound {
     RoundKey round;
     SampleRange samples;
     ServerId author;
-    Digest result{};  ///< Hash of it.
+    Digest result{};             ///< Hash of it.
+    std::uint32_t attempts = 0;  ///< At a second opinion, so far.
 };
 
 class Audit {
   public:
+    static constexpr std::uint32_t k_attempts = 3;  ///< Of servers at one round; then the client sees to it itself.
+
     explicit Audit(const AuditParams& params = {}) : params_(params) {}
     [[nodiscard]] bool enabled() const { return params_.share > 0; }
 
@@ -81,7 +84,7 @@ class Audit {
 
     // -- The client's own -----------------------------------------------------------------------------------
 
-    /// A round that only the client can settle: a disputed one, or of an author beside whom `nobody_else` is there.
+    /// A round that only the client can settle: a disputed one, one that servers did not get done, or of an author beside whom `nobody_else` is there.
     [[nodiscard]] std::optional<AuditedRound> next_for_client(
         const std::function<bool(ServerId)>& nobody_else) const;
     void grant_to_client(RoundKey round);
@@ -106,13 +109,16 @@ class Audit {
         std::optional<Lease> lease;                            ///< Of the second opinion.
         std::optional<std::pair<ServerId, Digest>> opinion{};  ///< That differs.
         bool at_client = false;
+        std::uint32_t attempts = 0;
 
+        [[nodiscard]] bool is_for_client() const { return opinion || attempts >= k_attempts; }
         [[nodiscard]] bool open() const { return !lease && !opinion && !at_client; }
     };
     using Items = std::map<RoundKey, Item>;
 
     [[nodiscard]] static AuditedRound round_of(const Items::value_type& entry) {
-        return {entry.first, entry.second.samples, entry.second.author, entry.second.result};
+        return {entry.first, entry.second.samples, entry.second.author, entry.second.result,
+                entry.second.attempts};
     }
     void end_lease(Item& item);
     Items::iterator reopen(Items::iterator entry);
@@ -122,7 +128,7 @@ class Audit {
     bool stopped_ = false;
     Items items_;
     std::map<ServerId, std::set<RoundKey>> open_;  ///< By author; no empty sets.
-    std::set<RoundKey> disputed_;                  ///< Not at the client yet.
+    std::set<RoundKey> for_client_;                ///< Disputed, or given up by others; not at the client yet.
     std::map<LeaseId, RoundKey> leases_;
     std::set<std::pair<TimeNs, LeaseId>> deadlines_;
 };
