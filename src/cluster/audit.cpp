@@ -144,7 +144,8 @@ void Audit::grant_to_client(RoundKey round) {
 }
 
 void Audit::release_client(RoundKey round) {
-    if (const auto entry = items_.find(round); entry != items_.end() && entry->second.at_client) reopen(entry);
+    if (const auto entry = items_.find(round); entry != items_.end() && entry->second.at_client)
+        reopen(entry);
 }
 
 std::vector<ServerId> Audit::on_truth(RoundKey round, const Digest& result) {
@@ -181,7 +182,8 @@ std::vector<Lease> Audit::forget(std::uint32_t unit) {
 
 void Audit::stop() {
     if (std::exchange(stopped_, true)) return;
-    for (auto it = items_.begin(); it != items_.end();) it = it->second.open() && !it->second.is_for_client() ? erase(it) : std::next(it);
+    for (auto it = items_.begin(); it != items_.end();)
+        it = it->second.open() && !it->second.is_for_client() ? erase(it) : std::next(it);
 }
 
 }  // namespace pathscope

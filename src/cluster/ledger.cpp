@@ -120,8 +120,8 @@ std::size_t Ledger::undo(std::uint32_t unit, const UnitSnapshot& kept, TimeNs no
     std::size_t undone = 0;
     for (std::uint32_t index = 0; index < account.fresh; ++index) {
         const RoundKey round{unit, index};
-        const bool is_kept = index < kept.reached &&
-                             !std::binary_search(kept.missing.begin(), kept.missing.end(), index);
+        const bool is_kept =
+            index < kept.reached && !std::binary_search(kept.missing.begin(), kept.missing.end(), index);
         if (is_kept || !committed(round)) continue;
         const SampleRange samples = samples_of_round(plan_, round);
         active_[round];

@@ -17,8 +17,8 @@ void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, const 
                                 const Digest& hash) {
     if (!audit_.enabled()) return;
     Contributions& gave = part == LightPart::direct ? gave_direct_ : gave_indirect_;
-    gave.add(claim.unit, {claim.server, 1, result.samples, result.rays, result.dropped_count,
-                          result.saturated_count});
+    gave.add(claim.unit,
+             {claim.server, 1, result.samples, result.rays, result.dropped_count, result.saturated_count});
     if (part == LightPart::direct) return;
     const RoundKey round = work_.indirect_ledger().round_at(claim.unit, claim.first);
     if (audit_.on_merged({round, {claim.first, claim.count}, claim.server, hash}))
@@ -52,9 +52,8 @@ std::optional<AuditedRound> ClientMachine::next_local_audit(bool disputes_only) 
             other = it->second.peer.id();
         }
     if (others > 1) disputes_only = true;
-    return audit_.next_for_client([&](ServerId author) {
-        return !disputes_only && (others == 0 || other == author);
-    });
+    return audit_.next_for_client(
+        [&](ServerId author) { return !disputes_only && (others == 0 || other == author); });
 }
 
 // ---- Opinions.
@@ -62,10 +61,9 @@ std::optional<AuditedRound> ClientMachine::next_local_audit(bool disputes_only) 
 void ClientMachine::on_opinion(const ResultClaim& claim, const Digest& hash) {
     const auto author = audit_.author_of(claim.lease);
     if (audit_.on_opinion(claim, hash)) return store_.count(Counter::rounds_audited, 1, author);
-    record(NoteEvent{LongText(
-        fmt::format("Servers {} and {} differ about samples {} to {} of unit {}; the client judges.",
-                    author.value, claim.server.value, claim.first, claim.first + claim.count - 1,
-                    claim.unit))});
+    record(NoteEvent{LongText(fmt::format(
+        "Servers {} and {} differ about samples {} to {} of unit {}; the client judges.", author.value,
+        claim.server.value, claim.first, claim.first + claim.count - 1, claim.unit))});
 }
 
 void ClientMachine::on_own_opinion(const LocalWork& work, const RoundOutcome& outcome) {
@@ -123,12 +121,13 @@ std::size_t ClientMachine::undo(const std::vector<std::uint32_t>& units) {
 std::size_t ClientMachine::begin_anew() {
     const Ledger& ledger = work_.indirect_ledger();
     std::uint64_t undone = 0;
-    for (std::uint32_t unit = 0; unit < gave_direct_.units(); ++unit) take_back(gave_direct_.take(unit), false);
+    for (std::uint32_t unit = 0; unit < gave_direct_.units(); ++unit)
+        take_back(gave_direct_.take(unit), false);
     for (std::uint32_t unit = 0; unit < gave_indirect_.units(); ++unit)
         undone += take_back(gave_indirect_.take(unit), true);
-    store_.take_back({{Counter::rounds, ledger.rounds()},
-                      {Counter::rounds_committed, ledger.rounds_committed() - undone}},
-                     k_local_server);
+    store_.take_back(
+        {{Counter::rounds, ledger.rounds()}, {Counter::rounds_committed, ledger.rounds_committed() - undone}},
+        k_local_server);
     store_.count(Counter::rounds_undone, undone);
     dropped_.clear();
     begin_epoch(PackMap{}, true);

@@ -32,8 +32,7 @@ std::optional<std::string> ClientMachine::reason_to_reject(const std::string& in
     return std::nullopt;
 }
 
-void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello,
-                             const Sender& sender) {
+void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender) {
     const std::string who = conduct_name(sender.key, hello.name, sender.address);
     if (const auto ban = conduct_.ban_of(who, now_)) return reject_banned(instance, *ban);
     if (const auto reason = reason_to_reject(instance, hello)) {

@@ -104,7 +104,8 @@ bool ClientMachine::grant_to(Server& server) {
         return lease_duration(predicted, attempts);
     };
     std::optional<Lease> lease;
-    if (const auto item = audit_.next_for(id))  // First: the sooner a liar is found, the less is to be undone.
+    if (const auto item =
+            audit_.next_for(id))  // First: the sooner a liar is found, the less is to be undone.
         lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
     if (!lease) lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {

@@ -76,9 +76,9 @@ std::size_t FrameWork::undo(std::uint32_t unit, TimeNs now) {
     const std::size_t undone =
         part.ledger.undo(unit, restored ? first_->indirect.units[unit] : UnitSnapshot{}, now);
     const std::uint32_t left = part.ledger.samples_committed(unit);
-    part.sums.reset_block(unit, left,
-                          restored ? std::span<const PixelSum>(first_->indirect.sums)
-                                   : std::span<const PixelSum>());
+    part.sums.reset_block(
+        unit, left,
+        restored ? std::span<const PixelSum>(first_->indirect.sums) : std::span<const PixelSum>());
     part.samples_merged -= (samples - left) * std::uint64_t(rect_of(unit).area());
     part.units_begun -= begun && left == 0;
     return undone;

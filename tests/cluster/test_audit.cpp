@@ -22,9 +22,9 @@ AuditedRound merged(std::uint32_t unit, ServerId author, const Digest& result) {
 ResultClaim grant(Audit& audit, ServerId server, std::uint64_t number) {
     const auto item = audit.next_for(server);
     REQUIRE(item);
-    const Lease lease{LeaseId{number},     Epoch{1}, item->round.unit, item->samples.first,
-                      item->samples.count, server,   0,                k_second_later,
-                      true};
+    const Lease lease{
+        LeaseId{number}, Epoch{1}, item->round.unit, item->samples.first, item->samples.count, server, 0,
+        k_second_later,  true};
     audit.grant(*item, lease);
     return {lease.id, lease.epoch, lease.unit, lease.first, lease.count, server};
 }

@@ -39,10 +39,10 @@ struct ClusterSettings {
     // Of each message, its chance.
     float lose = 0, duplicate = 0, damage = 0;
     double faults_per_second = 0;
-    float lie = 0;         ///< Of a liar's results, the chance of one false bit.
-    int liars = 0;         ///< Of the servers, the first.
-    int incapable = 0;     ///< Of the servers, the next: they cannot do their work, and say so.
-    double audit = 0;      ///< Share of rounds that are rendered twice.
+    float lie = 0;                     ///< Of a liar's results, the chance of one false bit.
+    int liars = 0;                     ///< Of the servers, the first.
+    int incapable = 0;                 ///< Of the servers, the next: they cannot do their work, and say so.
+    double audit = 0;                  ///< Share of rounds that are rendered twice.
     int new_states = 0;                ///< How often somebody drags the camera.
     int restarts = 0;                  ///< How often the client dies and is started again, from nothing.
     TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.

@@ -126,8 +126,7 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         : Process(cluster.time_),
           cluster_(cluster),
           name_(fmt::format("server-{}", pid)),
-          machine_({name_, "0", std::string(build_identity()), 1, pid, "client"},
-                   SceneCache({}), *this),
+          machine_({name_, "0", std::string(build_identity()), 1, pid, "client"}, SceneCache({}), *this),
           is_liar_(int(pid) <= cluster.settings_.liars),
           is_incapable_(!is_liar_ && int(pid) <= cluster.settings_.liars + cluster.settings_.incapable),
           renderer_(cluster.time_, samples_per_second, [this](RoundOutcome& outcome) {
@@ -174,7 +173,8 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         } else if (is_liar_ && cluster_.chance(cluster_.settings_.lie)) {
             ++cluster_.totals_.lies;
             auto& sums = outcome.result->sums;
-            sums[cluster_.rng_.next_u32() % sums.size()].g ^= std::int64_t{1} << cluster_.rng_.next_u32() % 16;
+            sums[cluster_.rng_.next_u32() % sums.size()].g ^= std::int64_t{1}
+                                                              << cluster_.rng_.next_u32() % 16;
         }
     }
     void dial() {

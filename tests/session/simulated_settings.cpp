@@ -51,7 +51,8 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
 std::string ClusterSettings::describe() const {
     return fmt::format(
         "{} servers, {}x{} in blocks of {}, {}+{} samples in rounds of {}, {}, {}, at least {}, lose {:.2f}, "
-        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, calm at {:.1f} s, {} liars of {:.2f}, {} incapable, {:.1f} "
+        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, calm at {:.1f} s, {} "
+        "liars of {:.2f}, {} incapable, {:.1f} "
         "audited",
         servers, width, height, block, spp, direct_spp, round_samples, name_of(schedule), name_of(detector),
         min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, to_seconds(calm_at),

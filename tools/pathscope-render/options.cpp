@@ -236,7 +236,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (const auto safe = check_keys(options, keys); !safe) return safe.error();
     if (options.client.listens && app.count("--min-servers") == 0) options.client.min_servers = 1;
-    if (options.client.listens && app.count("--audit") == 0) options.client.audit.share = k_audit_of_strangers;
+    if (options.client.listens && app.count("--audit") == 0)
+        options.client.audit.share = k_audit_of_strangers;
     return std::variant<RenderOptions, std::string>(std::move(options));
 }
 

@@ -20,7 +20,7 @@
 /// row (Ledger::new_lease_id) and are not in its account.
 /// Bounded: an item for each chosen round that is merged and not settled.   Cost: O(log n) per call, revoke and forget O(n).
 /// No clock: `now` is an argument and never falls.   Thread safety: one thread at a time.
-/// Test: tests/cluster/test_audit.cpp, tests/session/test_simulation.cpp
+/// Test: tests/cluster/test_audit.cpp, tests/session/test_simulation.cpp, tests/system/test_audit.py
 
 #include <cstdint>
 #include <functional>
@@ -51,7 +51,8 @@ struct AuditedRound {
 
 class Audit {
   public:
-    static constexpr std::uint32_t k_attempts = 3;  ///< Of servers at one round; then the client sees to it itself.
+    static constexpr std::uint32_t k_attempts =
+        3;  ///< Of servers at one round; then the client sees to it itself.
 
     explicit Audit(const AuditParams& params = {}) : params_(params) {}
     [[nodiscard]] bool enabled() const { return params_.share > 0; }
@@ -128,7 +129,7 @@ class Audit {
     bool stopped_ = false;
     Items items_;
     std::map<ServerId, std::set<RoundKey>> open_;  ///< By author; no empty sets.
-    std::set<RoundKey> for_client_;                ///< Disputed, or given up by others; not at the client yet.
+    std::set<RoundKey> for_client_;  ///< Disputed, or given up by others; not at the client yet.
     std::map<LeaseId, RoundKey> leases_;
     std::set<std::pair<TimeNs, LeaseId>> deadlines_;
 };
