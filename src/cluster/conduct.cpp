@@ -9,6 +9,9 @@
 namespace pathscope {
 
 std::string ban_sentence(const Ban& ban, TimeNs now) {
+    if (ban.last_offence == Offence::false_result)
+        return fmt::format("It gave a false result and may come back in {:.0f} s.",
+                           std::ceil(to_seconds(ban.left(now))));
     return fmt::format("It misbehaved too often (last: {}) and may come back in {:.0f} s.",
                        name_of(ban.last_offence), std::ceil(to_seconds(ban.left(now))));
 }
@@ -21,13 +24,15 @@ std::string conduct_name(std::string_view public_key, std::string_view name, std
 
 std::optional<Ban> Conduct::report(const std::string& who, Offence offence, TimeNs now) {
     Record& record = record_of(who, now);
-    if (record.ban.left(now) > 0) return std::nullopt;
+    if (record.ban.left(now) > 0 && offence != Offence::false_result) return std::nullopt;
     record.points = decayed(record, now) + points_of(offence);
     record.points_at = now;
     if (record.points < params_.ban_at) return std::nullopt;
 
     const int times = bans_remembered(record, now) + 1;
-    const double length = double(params_.first_ban) * std::pow(params_.growth, times - 1);
+    const double length = offence == Offence::false_result
+                              ? double(params_.longest_ban)
+                              : double(params_.first_ban) * std::pow(params_.growth, times - 1);
     record.ban = {now + TimeNs(std::min(length, double(params_.longest_ban))), times, offence};
     record.points = 0;
     return record.ban;
@@ -48,11 +53,18 @@ bool Conduct::may_send(const std::string& who, TimeNs now) {
     return record_of(who, now).allowance.allow(now);
 }
 
+std::optional<Ban> Conduct::report_flood(const std::string& who, TimeNs now) {
+    Record& record = record_of(who, now);
+    if (now < record.flood_reported_until) return std::nullopt;
+    record.flood_reported_until = now + k_second_ns;
+    return report(who, Offence::flood, now);
+}
+
 Conduct::Record& Conduct::record_of(const std::string& who, TimeNs now) {
     const auto found = records_.find(who);
     if (found != records_.end()) return found->second;
     if (records_.size() >= k_max_peers) make_room(now);
-    return records_.emplace(who, Record{0, now, {}, TokenBucket(params_.messages, now)}).first->second;
+    return records_.emplace(who, Record{0, now, {}, TokenBucket(params_.strangers, now)}).first->second;
 }
 
 /// Forgets the peer whose record weighs least: a standing ban weighs more than bans of the past, those more than points.

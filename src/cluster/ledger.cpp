@@ -59,6 +59,7 @@ std::vector<Lease> Ledger::new_epoch(const LedgerPlan& plan, TimeNs now) {
     outstanding_ = 0;
     committed_ = begun_ = restored_ = 0;
     accepted_before_ = counts_.accepted;
+    undone_before_ = counts_.undone;
     last_lease_before_ = last_lease_;
     if (!plan.open_ended()) count(Counter::rounds, rounds(), k_local_server);
     return dropped;
@@ -112,6 +113,27 @@ UnitSnapshot Ledger::snapshot(std::uint32_t unit) const {
     for (auto it = active_.lower_bound({unit, 0}); it != active_.end() && it->first.unit == unit; ++it)
         snapshot.missing.push_back(it->first.index);
     return snapshot;
+}
+
+std::size_t Ledger::undo(std::uint32_t unit, const UnitSnapshot& kept, TimeNs now) {
+    Unit& account = units_.at(unit);
+    std::size_t undone = 0;
+    for (std::uint32_t index = 0; index < account.fresh; ++index) {
+        const RoundKey round{unit, index};
+        const bool is_kept =
+            index < kept.reached && !std::binary_search(kept.missing.begin(), kept.missing.end(), index);
+        if (is_kept || !committed(round)) continue;
+        const SampleRange samples = samples_of_round(plan_, round);
+        active_[round];
+        reopened_.push_back(round);
+        account.samples -= samples.count;
+        note({{}, plan_.epoch, unit, samples.first, samples.count, {}, now, now}, UnitChange::reopened,
+             UnitReason::undone, now);
+        ++undone;
+    }
+    committed_ -= undone;
+    counts_.undone += undone;
+    return undone;
 }
 
 // -- Granting -----------------------------------------------------------------------------------------------
@@ -417,7 +439,7 @@ Result<void> Ledger::audit_balances() const {
     if (c.accepted != c.returned + c.late)
         return failed(fmt::format("Ledger: {} results were accepted, but {} came in time and {} late.",
                                   c.accepted, c.returned, c.late));
-    const std::uint64_t booked = c.accepted - accepted_before_ + restored_;
+    const std::uint64_t booked = c.accepted - accepted_before_ + restored_ - (c.undone - undone_before_);
     if (committed_ != booked)
         return failed(
             fmt::format("Ledger: {} rounds are committed, but {} results were booked.", committed_, booked));

@@ -39,6 +39,17 @@ void EventStore::count_all(std::initializer_list<Count> counts, ServerId server)
     }
 }
 
+void EventStore::take_back(std::initializer_list<Count> counts, ServerId server) {
+    if (!keeps_counters()) return;
+    const std::lock_guard lock(mutex_);
+    ServerTotals* const of_server = totals_of(server);
+    for (const auto& [counter, n] : counts) {
+        const auto index = static_cast<std::size_t>(counter);
+        totals_[index] -= n;
+        if (of_server != nullptr) of_server->totals[index] -= n;
+    }
+}
+
 void EventStore::count_earlier(std::initializer_list<Count> counts) {
     if (!keeps_counters()) return;
     const std::lock_guard lock(mutex_);

@@ -60,6 +60,10 @@ bool all_in_range(std::span<const PixelSum> sums, std::uint32_t count) {
 
 }  // namespace
 
+Digest hash_of_sums(std::span<const PixelSum> sums) {
+    return hash_text({reinterpret_cast<const char*>(sums.data()), sums.size_bytes()});
+}
+
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec) {
     CHECK(codec != Codec::zstd);
     put(tile, WireFormat::exact, codec, {reinterpret_cast<const char*>(sums.data()), sums.size_bytes()});

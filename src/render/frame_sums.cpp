@@ -43,6 +43,17 @@ void FrameSums::add(const Round& round, std::span<const PixelSum> sums) {
     }
 }
 
+void FrameSums::reset_block(std::uint32_t block, std::uint32_t samples, std::span<const PixelSum> to) {
+    CHECK(to.empty() ? samples == 0 : to.size() == sums_.size(), to.size(), samples);
+    samples_[block] = samples;
+    const PixelRect rect = grid_.rect(block);
+    for (int y = rect.y; y < rect.y + rect.height; ++y)
+        for (int x = rect.x; x < rect.x + rect.width; ++x) {
+            const std::size_t pixel = std::size_t(y) * std::size_t(grid_.width()) + std::size_t(x);
+            sums_[pixel] = to.empty() ? PixelSum{} : to[pixel];
+        }
+}
+
 Image FrameSums::mean() const {
     Image image(grid_.width(), grid_.height());
     for (int y = 0; y < image.height; ++y)

@@ -32,19 +32,22 @@ std::optional<std::string> ClientMachine::reason_to_reject(const std::string& in
     return std::nullopt;
 }
 
-void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello) {
+void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender) {
+    const std::string who = conduct_name(sender.key, hello.name, sender.address);
+    if (const auto ban = conduct_.ban_of(who, now_)) return reject_banned(instance, *ban);
     if (const auto reason = reason_to_reject(instance, hello)) {
         log_warning(fmt::format("Refused the server {}: {}", hello.name, *reason));
         send(Channel::monitor, instance,
              message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed, *reason,
                              0});
+        if (hello.instance != instance) offend(who, Offence::malformed);
         return;
     }
     auto found = servers_.find(instance);
     if (found != servers_.end()) {
         // It did not hear the WELCOME, or forgot its work: it starts over under the same id.
         Server& server = found->second;
-        work_.indirect_ledger().revoke(server.peer.id(), now_);
+        revoke(server.peer.id());
         server.credits.clear();
         step_peer(server, PeerCause::state_lost, "It said HELLO again.");
     } else {
@@ -55,11 +58,13 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         }
         const ServerId id{++last_server_};
         found = servers_
-                    .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
+                    .emplace(instance, Server{instance, hello.name, who, hello.pid, Peer(id, now_),
                                               FailureDetector(config_.detector, now_)})
                     .first;
         found->second.next_ping = next_look_ = now_;
+        found->second.allowance = TokenBucket(config_.conduct.messages, now_);
         server_by_id_.emplace(id, &found->second);
+        if (audit_.enabled()) authors_.emplace(id, Author{hello.name, who});
         store_.name_server(id, hello.name);
         store_.count(Counter::servers_joined, 1, id);
         for (LocalServer& local : local_servers_)
@@ -117,7 +122,7 @@ void ClientMachine::on(Server& server, message::Credit& message) {
     if (message.session != session_) return ask_who(server.instance);
     server.credits.set_limit(std::min<std::size_t>(message.credits, k_most_credits));
     for (const LeaseId lease : server.credits.settle_lost(message.received, now_ - k_longest_way))
-        work_.indirect_ledger().release(lease, server.peer.id(), now_);
+        release(lease, server.peer.id());
 }
 
 void ClientMachine::on(Server& server, message::Bye& message) {
@@ -143,7 +148,8 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
     Server& server = found->second;
     const ServerId id = server.peer.id();
     step_peer(server, cause, why);
-    const std::size_t open = work_.indirect_ledger().revoke(id, now_).size();
+    const std::size_t open = work_.indirect_ledger().outstanding(id);
+    revoke(id);
     if (cause == PeerCause::lost) store_.count(Counter::died, 1, id);
     log_note(fmt::format("{} {}: {} {} round{} of it go{} to others.", server.name,
                          cause == PeerCause::lost ? "is lost" : "left", why, open, open == 1 ? "" : "s",

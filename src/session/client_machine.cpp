@@ -19,6 +19,22 @@ std::uint64_t size_of(const Frames& frames) {
                            [](std::uint64_t sum, const std::string& frame) { return sum + frame.size(); });
 }
 
+/// Nothing, if it is no fault of the sender: another version is told so. Damage is what its line or its memory does.
+std::optional<Offence> offence_of(DecodeFault fault) {
+    switch (fault) {
+        case DecodeFault::foreign:
+            return Offence::foreign;
+        case DecodeFault::version:
+            return std::nullopt;
+        case DecodeFault::unknown_type:
+            return Offence::unknown_type;
+        case DecodeFault::misplaced:
+            return Offence::misplaced;
+        default:
+            return Offence::malformed;
+    }
+}
+
 /// The classic detector looks every six seconds; the adaptive one needs beats.
 TimeNs heartbeat_of(DetectorKind kind) {
     return kind == DetectorKind::fixed ? FixedDetectorParams{}.period
@@ -37,7 +53,10 @@ ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uin
       started_(now),
       heartbeat_(heartbeat_of(config.detector)),
       session_(session),
-      work_({config.block_size, config.round_samples, config.schedule, config.order, config.sampling},
+      conduct_(config.conduct),
+      audit_(config.audit),
+      work_({config.block_size, config.round_samples, config.schedule, config.order, config.sampling,
+             config.audit.share > 0},
             store) {
     store_.name_server(k_local_server, "client");
     job_.state.files = job_.depot.manifest_hash();
@@ -64,6 +83,7 @@ void ClientMachine::on_timers(TimeNs now) {
     if (probes_left_ > 0 && now_ >= next_probe_) probe_connections();
     if (now_ >= next_look_) watch_heartbeats();
     work_.indirect_ledger().expire(now_);
+    audit_.expire(now_);
     enforce_time_limit();
     hand_out();
 }
@@ -73,13 +93,17 @@ TimeNs ClientMachine::next_timer(TimeNs now) const {
     if (probes_left_ > 0) next = std::min(next, next_probe_);
     if (!servers_.empty()) next = std::min(next, next_look_);
     if (const auto deadline = work_.indirect_ledger().next_deadline()) next = std::min(next, *deadline);
-    if (config_.time_limit > 0 && !stopped_) next = std::min(next, started_ + config_.time_limit);
+    if (const auto deadline = audit_.next_deadline()) next = std::min(next, *deadline);
+    // After that time, what is missing for a picture is waited for like anything else.
+    if (const TimeNs end = started_ + config_.time_limit; config_.time_limit > 0 && now < end)
+        next = std::min(next, end);
     return std::max(next, now);
 }
 
 void ClientMachine::enforce_time_limit() {
-    if (config_.time_limit == 0 || stopped_ || now_ - started_ < config_.time_limit || !work_.has_image())
-        return;
+    if (config_.time_limit == 0 || stopped_ || now_ - started_ < config_.time_limit) return;
+    audit_.stop();
+    if (!work_.has_image() || !audit_.settled()) return;
     stopped_ = true;
     work_.stop();
     world_.cancel_all();
@@ -101,9 +125,19 @@ void ClientMachine::change_state(RenderState state, std::shared_ptr<const Scene>
     packed_state_ = pack(encode_state(job_.state));
     state_hash_ = hash_text(packed_state_);
 
+    begin_epoch(changes, false);
+}
+
+/// All rounds of the epoch before end, here and everywhere.
+void ClientMachine::begin_epoch(const PackMap& changes, bool same_frame) {
     const Epoch epoch{work_.epoch().value + 1};
     world_.cancel_all();
-    work_.begin(job_.state.settings, epoch, now_);
+    same_frame ? work_.begin_anew(job_.state.settings, epoch, now_)
+               : work_.begin(job_.state.settings, epoch, now_);
+    audit_.begin();
+    gave_direct_.clear();
+    gave_indirect_.clear();
+    std::erase_if(authors_, [this](const auto& author) { return !server_by_id_.contains(author.first); });
     servers_changed();
     Frames input = encode(message::Input{session_, epoch, ++sequence_, state_hash_, pack(changes)});
     store_.count_all({{Counter::messages_out, 1}, {Counter::bytes_out, size_of(input)}});
@@ -115,26 +149,35 @@ void ClientMachine::change_state(RenderState state, std::shared_ptr<const Scene>
 
 // ---- Messages.
 
-void ClientMachine::on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now) {
+void ClientMachine::on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now,
+                               const Sender& sender) {
     now_ = now;
     const auto found = servers_.find(instance);
     Server* server = found == servers_.end() ? nullptr : &found->second;
     const ServerId id = server ? server->peer.id() : k_local_server;
     const std::uint64_t bytes = size_of(frames);
     store_.count_all({{Counter::messages_in, 1}, {Counter::bytes_in, bytes}}, id);
+    const std::string who = server ? server->who : conduct_name(sender.key, "", sender.address);
+    if (!(server ? server->allowance.allow(now_) : conduct_.may_send(who, now_))) {
+        count_dropped(id, "It sends more messages than anyone needs.", channel);
+        if (const auto ban = conduct_.report_flood(who, now_)) shut_out(who, *ban);
+        return;
+    }
 
     Decoded decoded = decode(std::move(frames), Role::client, channel);
     if (!decoded) {
         count_dropped(id, decoded.error().sentence, channel);
-        return reject_undecodable(instance, decoded.error(), channel);
+        if (!conduct_.ban_of(who, now_)) reject_undecodable(instance, decoded.error(), channel);
+        if (const auto offence = offence_of(decoded.error().fault)) offend(who, *offence);
+        return;
     }
     if (store_.keeps_events())
         record(MessageEvent{MessageWay::received, name_of(type_of(*decoded)), name_of(channel), id, bytes,
                             LongText(to_text(*decoded))});
-    if (const auto* hello = std::get_if<message::Hello>(&*decoded)) return on_hello(instance, *hello);
+    if (const auto* hello = std::get_if<message::Hello>(&*decoded)) return on_hello(instance, *hello, sender);
     if (!server) {
         count_dropped(id, "It comes from a server that did not say HELLO.", channel);
-        return ask_who(instance);
+        return conduct_.ban_of(who, now_) ? void() : ask_who(instance);
     }
     if (type_of(*decoded) != MessageType::pong) server->detector.on_traffic(now_);
     if (server->peer.state() == PeerState::suspect) step_peer(*server, PeerCause::heard, "It spoke again.");

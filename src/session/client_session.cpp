@@ -26,6 +26,12 @@ std::uint64_t random_session() {
     return std::max<std::uint64_t>(number, 1);
 }
 
+/// Servers must not know which rounds are audited.
+ClientConfig with_secret(ClientConfig config) {
+    if (config.audit.secret == 0) config.audit.secret = random_session();
+    return config;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ClientSession>> ClientSession::create(const ClientConfig& config, ClientJob job,
@@ -48,7 +54,7 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
       store_(store),
       wake_(std::move(wake)),
       runner_(wake_, config.threads),
-      machine_(config, std::move(job), random_session(), store, *this, monotonic_now()),
+      machine_(with_secret(config), std::move(job), random_session(), store, *this, monotonic_now()),
       last_step_(monotonic_now()) {}
 
 ClientSession::~ClientSession() { machine_.say_goodbye(monotonic_now()); }
@@ -138,7 +144,8 @@ void ClientSession::step(TimeNs max_wait) {
 
 void ClientSession::receive(RouterSocket& socket, Channel channel) {
     drain(socket, k_messages_per_turn, [&](RoutedMessage message) {
-        machine_.on_message(message.peer, std::move(message.frames), channel, monotonic_now());
+        const Sender sender{std::move(message.key), std::move(message.address)};
+        machine_.on_message(message.peer, std::move(message.frames), channel, monotonic_now(), sender);
     });
 }
 

@@ -119,7 +119,11 @@ bool ClientMachine::grant_to(Server& server) {
         if (predicted) *predicted = std::max(*predicted, server.turnaround.mean());
         return lease_duration(predicted, attempts);
     };
-    std::optional<Lease> lease = work_.grant_indirect(id, now_, duration);
+    std::optional<Lease> lease;
+    if (const auto item =
+            audit_.next_for(id))  // First: the sooner a liar is found, the less is to be undone.
+        lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
+    if (!lease) lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.
         if (auto estimate = server.speed.predict(samples_of_full_round())) {
@@ -137,6 +141,7 @@ bool ClientMachine::grant_to(Server& server) {
 void ClientMachine::send_lease(Server& server, const Lease& lease) {
     const TimeNs duration = lease.deadline - now_;
     server.credits.take(lease.id, now_, lease.deadline + duration);
+    server.allowance.give(1, now_);
     message::Lease message;
     message.session = session_;
     message.lease = lease.id;
@@ -149,7 +154,7 @@ void ClientMachine::send_lease(Server& server, const Lease& lease) {
     message.lease_ms = std::uint32_t(std::clamp<TimeNs>(duration / k_millisecond_ns, 1, 3'600'000));
     if (send(Channel::frames, server.instance, std::move(message), server.peer.id())) return;
     // Not connected on frames, for the moment: its next CREDIT will tell that it is again.
-    work_.indirect_ledger().release(lease.id, server.peer.id(), now_);
+    release(lease.id, server.peer.id());
     server.credits.settle(lease.id);
     server.credits.set_limit(0);
 }
@@ -175,21 +180,37 @@ std::optional<ClientMachine::LocalWork> ClientMachine::next_local_work() {
 
 void ClientMachine::hand_out_locally() {
     while (local_work_.size() < k_local_rounds) {
-        const std::optional<LocalWork> work = next_local_work();
+        std::optional<LocalWork> work;
+        const auto take_audit = [&](bool disputes_only) {
+            const auto item = next_local_audit(disputes_only);
+            if (!item) return;
+            audit_.grant_to_client(item->round);
+            work.emplace().audit = item;
+        };
+        take_audit(true);
+        if (!work) work = next_local_work();
+        if (!work) take_audit(false);
         if (!work) return;
-        const std::uint64_t ticket = ++last_ticket_;
-        const LightPart part = work->indirect ? LightPart::indirect : LightPart::direct;
-        const bool direct_too = work->indirect && work->direct;
-        const Round round = work_.round_of(work->indirect ? *work->indirect : *work->direct);
-        local_work_.emplace(ticket, *work);
-        world_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too,
-                      config_.strategy});
+        begin_local(*work);
     }
+}
+
+void ClientMachine::begin_local(LocalWork work) {
+    work.epoch = work_.epoch();
+    const std::uint64_t ticket = ++last_ticket_;
+    const LightPart part = work.indirect || work.audit ? LightPart::indirect : LightPart::direct;
+    const bool direct_too = work.indirect && work.direct;
+    const Round round = work.audit ? work_.round_of(work.audit->round.unit, work.audit->samples)
+                                   : work_.round_of(work.indirect ? *work.indirect : *work.direct);
+    local_work_.emplace(ticket, std::move(work));
+    world_.begin({ticket, part, round, job_.scene, job_.state.camera, job_.state.settings, direct_too,
+                  config_.strategy});
 }
 
 void ClientMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
     now_ = now;
     const LocalWork work = local_work_.extract(outcome.ticket).mapped();
+    if (work.audit) return on_own_opinion(work, outcome);
     if (work.direct) settle(LightPart::direct, *work.direct, work.indirect ? outcome.direct : outcome.result);
     if (work.indirect) settle(LightPart::indirect, *work.indirect, outcome.result);
 }
@@ -200,12 +221,15 @@ void ClientMachine::settle(LightPart part, const Lease& lease, const std::option
         if (part == LightPart::direct)
             work_.release_direct(lease, now_);
         else
-            work_.indirect_ledger().release(lease.id, k_local_server, now_);
+            release(lease.id, k_local_server);
         return;
     }
     const ResultClaim claim{lease.id, lease.epoch, lease.unit, lease.first, lease.count, k_local_server};
     const Commit commit = work_.commit(part, claim, result->sums, now_);
-    if (commit.verdict == Verdict::accepted) count_result(*result, k_local_server);
+    if (commit.verdict == Verdict::accepted) {
+        count_result(*result, k_local_server);
+        note_merged(part, claim, *result, result->sums);
+    }
     cancel_superseded(commit.superseded);
 }
 
@@ -215,9 +239,12 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     const ResultClaim claim{
         tile.lease, tile.session == session_ ? tile.epoch : Epoch{}, tile.unit, tile.first, tile.count, id};
     // Decoded only if it counts, committed only if it decodes.
-    if (work_.indirect_ledger().judge(claim) != Verdict::accepted) {
+    const bool audits = audit_.holds(claim);
+    if (const Verdict verdict = work_.indirect_ledger().judge(claim);
+        !audits && verdict != Verdict::accepted) {
         work_.commit(LightPart::indirect, claim, {}, now_);
-        return;
+        const bool never_granted = verdict == Verdict::unknown || verdict == Verdict::mismatched;
+        return never_granted ? offend(server.who, Offence::unknown_lease) : void();
     }
     const PixelRect rect = work_.rect_of(tile.unit);
     RoundResult result;
@@ -230,9 +257,12 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     if (const auto read =
             read_strategy_result(config_.strategy, tile, rect, arrived_, job_.state.settings.wire);
         !read) {
-        work_.indirect_ledger().release(tile.lease, id, now_);
-        return count_dropped(id, read.error().message, Channel::frames);
+        release(tile.lease, id);
+        count_dropped(id, read.error().message, Channel::frames);
+        return offend(server.who, Offence::corrupt);
     }
+
+    if (audits) return on_opinion(claim, arrived_);
 
     const Commit commit = work_.commit(LightPart::indirect, claim, arrived_, now_);
     store_.count_all(
@@ -241,6 +271,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
+    note_merged(LightPart::indirect, claim, result, arrived_);
     const bool may_be_drawn =
         store_.keeps_events() && is_plausible(tile.started_ns) && is_plausible(tile.render_ns);
     if (const auto offset = server.clock.at(now_); offset && may_be_drawn)
@@ -252,14 +283,19 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
 void ClientMachine::on(Server& server, message::Nack& message) {
     server.credits.settle(message.lease);
     if (message.session != session_ || message.epoch != work_.epoch()) return;
-    work_.indirect_ledger().release(message.lease, server.peer.id(), now_);
+    release(message.lease, server.peer.id());
     if (message.code == NackCode::state || message.code == NackCode::scene) {
         step_peer(server, PeerCause::state_lost, name_of(message.code));
         return servers_changed();
     }
     if (message.code == NackCode::unsupported || message.code == NackCode::failed ||
-        message.code == NackCode::memory)
-        lose(server.instance, PeerCause::lost, fmt::format("It cannot do its work ({}).", message.text));
+        message.code == NackCode::memory) {
+        // It is welcome again when it forgot what ails it, but not for ever.
+        const std::string instance = server.instance, who = server.who;
+        const auto ban = conduct_.report(who, Offence::failed, now_);
+        if (ban) shut_out(who, *ban);
+        lose(instance, PeerCause::lost, fmt::format("It cannot do its work ({}).", message.text));
+    }
 }
 
 void ClientMachine::count_result(const RoundResult& result, ServerId server) {
@@ -274,10 +310,23 @@ void ClientMachine::count_result(const RoundResult& result, ServerId server) {
 }
 
 void ClientMachine::cancel_superseded(const std::vector<Lease>& leases) {
-    for (const Lease& lease : leases)
-        if (const auto holder = server_by_id_.find(lease.server); holder != server_by_id_.end())
-            send(Channel::frames, holder->second->instance,
-                 message::Cancel{session_, lease.epoch, {lease.id.value}}, lease.server);
+    for (const Lease& lease : leases) cancel(lease);
+}
+
+void ClientMachine::cancel(const Lease& lease) {
+    if (const auto holder = server_by_id_.find(lease.server); holder != server_by_id_.end())
+        send(Channel::frames, holder->second->instance,
+             message::Cancel{session_, lease.epoch, {lease.id.value}}, lease.server);
+}
+
+/// A lease ends without a result, whatever it was for.
+void ClientMachine::release(LeaseId lease, ServerId server) {
+    if (!audit_.release(lease, server)) work_.indirect_ledger().release(lease, server, now_);
+}
+
+void ClientMachine::revoke(ServerId server) {
+    work_.indirect_ledger().revoke(server, now_);
+    audit_.revoke(server);
 }
 
 Progress ClientMachine::progress() const {

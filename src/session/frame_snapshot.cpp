@@ -56,6 +56,7 @@ Result<void> FrameWork::restore(FrameSnapshot snapshot) {
     const bool no_pass = last_pass_finished_ && passes_finished_ == 0;
     if (no_pass || passes_finished_ > (staged() ? k_most_passes : 0))
         return bad_input("Its passes are not those of this frame.");
+    if (plan_.can_undo) first_ = snapshot;
     if (const auto done = restore(direct_, std::move(snapshot.direct)); !done) return done;
     if (const auto done = restore(indirect_, std::move(snapshot.indirect)); !done) return done;
     if (last_pass_finished_ && !complete())

@@ -30,6 +30,7 @@ FrameWork::FrameWork(const WorkPlan& plan, EventStore& store)
 std::vector<Lease> FrameWork::begin(const RenderSettings& settings, Epoch epoch, TimeNs now) {
     grid_ = BlockGrid(settings.width, settings.height, plan_.block_size);
     epoch_ = epoch;
+    first_.reset();
     passes_finished_ = 0;
     last_pass_finished_ = false;
     const auto order = order_of_groups(
@@ -54,6 +55,33 @@ std::vector<Lease> FrameWork::begin(Part& part, std::uint32_t samples, Quantum q
     part.noise.clear();
     open_pass(part);
     return dropped;
+}
+
+std::vector<Lease> FrameWork::begin_anew(const RenderSettings& settings, Epoch epoch, TimeNs now) {
+    const std::optional<FrameSnapshot> first = std::move(first_);
+    std::vector<Lease> dropped = begin(settings, epoch, now);
+    if (first) {
+        const auto restored = restore(*first);
+        CHECK(restored);  // As it was before.
+    }
+    return dropped;
+}
+
+std::size_t FrameWork::undo(std::uint32_t unit, TimeNs now) {
+    CHECK(plan_.can_undo && !staged());
+    Part& part = indirect_;
+    const bool begun = part.sums.samples_of_block(unit) > 0;
+    const std::uint64_t samples = part.ledger.samples_committed(unit);
+    const bool restored = first_ && !first_->indirect.units.empty();
+    const std::size_t undone =
+        part.ledger.undo(unit, restored ? first_->indirect.units[unit] : UnitSnapshot{}, now);
+    const std::uint32_t left = part.ledger.samples_committed(unit);
+    part.sums.reset_block(
+        unit, left,
+        restored ? std::span<const PixelSum>(first_->indirect.sums) : std::span<const PixelSum>());
+    part.samples_merged -= (samples - left) * std::uint64_t(rect_of(unit).area());
+    part.units_begun -= begun && left == 0;
+    return undone;
 }
 
 LedgerPlan FrameWork::plan_of(std::uint32_t samples) const {

@@ -23,7 +23,8 @@ void ServerMachine::on_linked(std::string instance, TimeNs now) {
     linked_ = true;
     phase_ = Phase::hello;
     hello_pause_ = k_first_hello_pause;
-    next_hello_ = last_heard_ = now_;
+    last_heard_ = now_;
+    next_hello_ = std::max(now_, banned_until_);
 }
 
 void ServerMachine::relink(std::string why) {
@@ -33,6 +34,12 @@ void ServerMachine::relink(std::string why) {
 void ServerMachine::on_refused(TimeNs now) {
     now_ = now;
     relink_reason_ = "";
+}
+
+void ServerMachine::on_connection_lost(TimeNs now) {
+    now_ = now;
+    banned_until_ = now_;
+    if (linked_ && phase_ == Phase::hello) next_hello_ = std::min(next_hello_, now_ + k_first_hello_pause);
 }
 
 /// Forgets everything about this client but the scene, which the next one may want as well.

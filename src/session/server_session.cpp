@@ -118,7 +118,9 @@ void ServerSession::step() {
 
 /// Refused at the door: it says so, and dials anew after a pause, as ZeroMQ does not.
 void ServerSession::on_connection_changes() {
-    for (const Refusal& refusal : link_->watch.take_changes().refusals) {
+    const ConnectionChanges changes = link_->watch.take_changes();
+    if (changes.lost > 0) machine_.on_connection_lost(monotonic_now());
+    for (const Refusal& refusal : changes.refusals) {
         const auto sentence =
             redial_.on_refused(refusal.reason, endpoint(config_, 1), config_.security, monotonic_now());
         if (sentence) log_warning(fmt::format("{}: {}", config_.name, *sentence));

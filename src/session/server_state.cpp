@@ -30,12 +30,17 @@ void ServerMachine::on(message::Welcome& message) {
 }
 
 void ServerMachine::on(message::Reject& message) {
-    if (phase_ != Phase::hello) return;
+    const TimeNs welcome_again = now_ + TimeNs(message.retry_ms) * k_millisecond_ns;
+    if (phase_ != Phase::hello) {
+        if (message.code != RejectCode::banned || message.retry_ms == 0) return;
+        banned_until_ = welcome_again;
+        return relink(fmt::format("The client refuses this server for now: {}", message.text));
+    }
     if (message.retry_ms == 0)
         return end(
             failed(fmt::format("The client at {} refuses this server: {}", identity_.client, message.text)));
     log_note(fmt::format("{}: not admitted yet: {}", identity_.name, message.text));
-    next_hello_ = now_ + TimeNs(message.retry_ms) * k_millisecond_ns;
+    next_hello_ = welcome_again;
 }
 
 void ServerMachine::on(message::Snapshot& message) {

@@ -14,6 +14,10 @@ constexpr std::size_t k_more_answers = 8;
 
 }  // namespace
 
+void ServerWorld::fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const {
+    put_block_result(tile, result.sums, format);
+}
+
 void ServerMachine::on(message::Lease& lease) {
     if (lease.session != session_ || !held_ || holds_lease(lease.lease)) return;
     // Who grants without end and takes no answer would fill the memory with answers. These leases expire.

@@ -90,7 +90,7 @@ TEST_CASE("bans grow with each repeat up to a limit, and good conduct is remembe
 
 TEST_CASE("a flood is stopped at the allowance; others have their own") {
     ConductParams params;
-    params.messages = {100, 50};
+    params.strangers = {100, 50};
     Conduct conduct(params);
     int heard = 0;
     for (int i = 0; i < 10'000; ++i) heard += conduct.may_send("a", k_start + i * 100 * k_microsecond_ns);

@@ -36,7 +36,7 @@ TEST_CASE("tables of names are complete") {
     CHECK(table_is_complete(ProbeLevel::full));
     CHECK(table_is_complete(MessageWay::dropped));
     CHECK(table_is_complete(UnitChange::refused));
-    CHECK(table_is_complete(UnitReason::mismatched));
+    CHECK(table_is_complete(UnitReason::undone));
     CHECK(table_is_complete(CheckOutcome::yes));
 }
 

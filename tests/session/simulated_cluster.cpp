@@ -47,13 +47,26 @@ void SimulatedCluster::start_client() {
         state.settings.direct_spp = settings_.direct_spp;
         state.settings.seed = settings_.seed;
     } else {
-        totals_.bad_messages += client_->store().total(Counter::bad_messages);
-        totals_.deaths += client_->store().total(Counter::died);
+        count_client();
     }
     if (client_) client_->kill();
     clients_.push_back(std::make_unique<Client>(*this, std::move(state), ++sessions_));
     client_ = clients_.back().get();
     last_progress_ = time_.now();
+    // What the one before sent is heard first.
+    for (const auto& server : servers_)
+        time_.at(std::max({time_.now(), server->parted_until(), server->from_client[1].last_arrival}) + 1,
+                 [&server = *server] { server.when_awake([&server] { server.connection_lost(); }); });
+}
+
+void SimulatedCluster::count_client() {
+    const EventStore& store = client_->store();
+    totals_.bad_messages += store.total(Counter::bad_messages);
+    totals_.deaths += store.total(Counter::died);
+    totals_.bans += store.total(Counter::banned);
+    totals_.audited += store.total(Counter::rounds_audited);
+    totals_.unmasked += store.total(Counter::audits_differing);
+    totals_.undone += store.total(Counter::rounds_undone);
 }
 
 void SimulatedCluster::start_server() {
@@ -101,8 +114,9 @@ Frames SimulatedCluster::damaged(Frames frames) {
 }
 
 void SimulatedCluster::to_client(Server& server, Channel channel, Frames frames) {
-    const auto arrive = [this, channel, instance = server.instance()](const Frames& arrived) {
-        client_->when_awake([=, this] { client_->receive(instance, channel, arrived); });
+    const auto arrive = [this, channel, instance = server.instance(),
+                         sender = server.sender()](const Frames& arrived) {
+        client_->when_awake([=, this] { client_->receive(instance, channel, arrived, sender); });
     };
     transmit(server.from_server[int(channel)], server, std::move(frames), arrive);
 }
@@ -191,26 +205,38 @@ void SimulatedCluster::strike() {
     }
 }
 
+TimeNs SimulatedCluster::end_of_bans() const {
+    TimeNs end = 0;
+    for (const auto& server : servers_)
+        if (const auto ban = client_->machine().conduct().ban_of(server->conduct_name(), time_.now()))
+            end = std::max(end, ban->until);
+    return end;
+}
+
 std::string SimulatedCluster::run() {
     start_client();
     for (int i = 0; i < settings_.servers; ++i) start_server();
     plan_faults();
 
+    const TimeNs epilogue = settings_.detector == DetectorKind::fixed ? k_slow_epilogue : k_epilogue;
     TimeNs end = k_longest_run;
-    while (!time_.empty() && time_.next() <= end && failure_.empty()) {
+    while (failure_.empty() && !time_.empty()) {
+        // Who is banned comes back by itself.
+        if (time_.next() > end) end = std::max(end, end_of_bans() + epilogue);
+        if (time_.next() > end) break;
         time_.step();
         ++totals_.events;
         check_pace();
         check_all();
-        if (done() && end == k_longest_run)
-            end = std::max(time_.now(), settings_.calm_at) +
-                  (settings_.detector == DetectorKind::fixed ? k_slow_epilogue : k_epilogue);
+        if (!done())
+            end = k_longest_run;  // A new state that the client heard of only after a pause.
+        else if (end == k_longest_run)
+            end = std::max(time_.now(), settings_.calm_at) + epilogue;
     }
     if (failure_.empty()) check_end();
     totals_.virtual_time = time_.now();
     totals_.ledger = client_->machine().work().indirect_ledger().counts();
-    totals_.bad_messages += client_->store().total(Counter::bad_messages);
-    totals_.deaths += client_->store().total(Counter::died);
+    count_client();
     return failure_;
 }
 

@@ -39,6 +39,10 @@ struct ClusterSettings {
     // Of each message, its chance.
     float lose = 0, duplicate = 0, damage = 0;
     double faults_per_second = 0;
+    float lie = 0;                     ///< Of a liar's results, the chance of one false bit.
+    int liars = 0;                     ///< Of the servers, the first.
+    int incapable = 0;                 ///< Of the servers, the next: they cannot do their work, and say so.
+    double audit = 0;                  ///< Share of rounds that are rendered twice.
     int new_states = 0;                ///< How often somebody drags the camera.
     int restarts = 0;                  ///< How often the client dies and is started again, from nothing.
     TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.
@@ -53,8 +57,9 @@ struct ClusterTotals {
     std::uint64_t lost = 0, doubled = 0, damaged = 0, parted = 0, unreachable = 0;
     std::uint64_t kills = 0, freezes = 0, partitions = 0, drains = 0, joins = 0, pauses = 0, restarts = 0,
                   new_states = 0;
-    std::uint64_t bad_messages = 0, deaths = 0;
     std::uint64_t most_leases = 0;  ///< Of one server at once.
+    std::uint64_t bad_messages = 0, deaths = 0, bans = 0;
+    std::uint64_t lies = 0, audited = 0, unmasked = 0, undone = 0, failures = 0;
     LedgerCounts ledger;
     TimeNs virtual_time = 0;
 
@@ -104,9 +109,15 @@ class SimulatedCluster {
     void check_progress();
     void check_end();
     void check_light();
+    void check_accounts();
     void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);
     [[nodiscard]] bool someone_can_work() const;
     [[nodiscard]] bool done() const;
+    void count_client();
+    /// Whether each sum is to be that of its samples: at any time, or at the end at least.
+    [[nodiscard]] bool always_honest() const { return settings_.liars == 0 || settings_.lie == 0; }
+    [[nodiscard]] bool honest_at_the_end() const { return always_honest() || settings_.audit >= 1; }
+    [[nodiscard]] TimeNs end_of_bans() const;
 
     ClusterSettings settings_;
     ClusterTotals totals_;

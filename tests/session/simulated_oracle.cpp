@@ -59,7 +59,7 @@ void SimulatedCluster::check_pace() {
 void SimulatedCluster::check_progress() {
     const std::uint64_t committed = client_->machine().work().indirect_ledger().rounds_committed();
     const bool moved = std::exchange(committed_, committed) != committed;
-    if (moved) check_light();
+    if (moved && always_honest()) check_light();
     if (moved || done() || client_->machine().complete() || !someone_can_work() || !calm())
         last_progress_ = time_.now();
     if (time_.now() - last_progress_ > k_longest_wait)
@@ -100,13 +100,30 @@ void SimulatedCluster::check_picture(LightPart part, const FrameSums& sums, std:
         }
 }
 
+/// What is counted is what is in the picture, once: also where light was taken back.
+void SimulatedCluster::check_accounts() {
+    const EventStore& store = client_->store();
+    const RenderSettings& settings = client_->machine().state().settings;
+    const auto pixels = std::uint64_t(settings.width) * std::uint64_t(settings.height);
+    std::uint64_t of_servers = 0;
+    for (const ServerSummary& server : store.servers()) of_servers += server.total(Counter::samples);
+    const std::uint64_t samples = store.total(Counter::samples);
+    if (client_->machine().epoch().value == 1 && samples != pixels * (settings.spp + settings.direct_spp))
+        fail(fmt::format("{} samples are counted, not {}", samples,
+                         pixels * (settings.spp + settings.direct_spp)));
+    if (samples != of_servers || store.total(Counter::rays) != 3 * samples)
+        fail("the counters of the servers do not add up to the totals");
+}
+
 void SimulatedCluster::check_end() {
     if (!done()) {
         if (!someone_can_work()) return;  // Nobody was left, and the client was told to wait for somebody.
         return fail("the frame is not complete");
     }
     const ClientMachine& machine = client_->machine();
-    check_picture(LightPart::indirect, machine.work().indirect(), machine.state().settings.spp);
+    if (honest_at_the_end())
+        check_picture(LightPart::indirect, machine.work().indirect(), machine.state().settings.spp);
+    check_accounts();
     check_picture(LightPart::direct, machine.work().direct(), machine.state().settings.direct_spp);
     const Digest wanted = state_hash(machine.state());
     int alive = 0;

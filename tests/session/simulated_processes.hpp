@@ -73,8 +73,8 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
         settle();
     }
 
-    void receive(const std::string& instance, Channel channel, Frames frames) {
-        machine_.on_message(instance, std::move(frames), channel, time_.now());
+    void receive(const std::string& instance, Channel channel, Frames frames, const Sender& sender) {
+        machine_.on_message(instance, std::move(frames), channel, time_.now(), sender);
     }
     void connection_lost() { machine_.on_connection_lost(time_.now()); }
     void change_state(RenderState state) { machine_.change_state(std::move(state), nullptr, time_.now()); }
@@ -97,6 +97,9 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
         config.detector = settings.detector;
         config.block_size = settings.block;
         config.round_samples = settings.round_samples;
+        config.audit = {settings.audit, settings.seed};
+        config.conduct.first_ban = 4 * k_second_ns;  // So that bans end while there is work.
+        config.conduct.longest_ban = 20 * k_second_ns;
         return config;
     }
 
@@ -122,9 +125,12 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
     Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second)
         : Process(cluster.time_),
           cluster_(cluster),
-          machine_({fmt::format("server-{}", pid), "0", std::string(build_identity()), 1, pid, "client"},
-                   SceneCache({}), *this),
+          name_(fmt::format("server-{}", pid)),
+          machine_({name_, "0", std::string(build_identity()), 1, pid, "client"}, SceneCache({}), *this),
+          is_liar_(int(pid) <= cluster.settings_.liars),
+          is_incapable_(!is_liar_ && int(pid) <= cluster.settings_.liars + cluster.settings_.incapable),
           renderer_(cluster.time_, samples_per_second, [this](RoundOutcome& outcome) {
+              misrender(outcome);
               when_awake([this, outcome]() mutable { machine_.on_outcome(outcome, time_.now()); });
           }) {
         dial();
@@ -134,23 +140,43 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         if (instance == instance_ && machine_.linked())
             machine_.on_message(std::move(frames), channel, time_.now());
     }
+    void connection_lost() { machine_.on_connection_lost(time_.now()); }
     /// SIGTERM.
     void drain() {
         if (std::exchange(draining_, true)) return;
         machine_.drain(time_.now());
     }
     void part(TimeNs until) { parted_until_ = std::max(parted_until_, until); }
+    [[nodiscard]] TimeNs parted_until() const { return parted_until_; }
     [[nodiscard]] bool parted() const { return time_.now() < parted_until_; }
     [[nodiscard]] bool draining() const { return draining_; }
     [[nodiscard]] bool reachable_as(const std::string& instance) const {
         return runs() && instance == instance_ && machine_.linked();
     }
     [[nodiscard]] const std::string& instance() const { return instance_; }
+    [[nodiscard]] Sender sender() const { return {"", "10.0.0.1"}; }
+    [[nodiscard]] std::string conduct_name() const {
+        return pathscope::conduct_name("", name_, sender().address);
+    }
     [[nodiscard]] const ServerMachine& machine() const { return machine_; }
 
     Wire from_client[3], from_server[3];
 
   private:
+    /// One bit of the light, and nothing else: sizes and hashes are right.
+    void misrender(RoundOutcome& outcome) {
+        if (!outcome.result) return;
+        if (is_incapable_) {
+            ++cluster_.totals_.failures;
+            outcome.result.reset();
+            outcome.failure = "It has no scene to speak of.";
+        } else if (is_liar_ && cluster_.chance(cluster_.settings_.lie)) {
+            ++cluster_.totals_.lies;
+            auto& sums = outcome.result->sums;
+            sums[cluster_.rng_.next_u32() % sums.size()].g ^= std::int64_t{1}
+                                                              << cluster_.rng_.next_u32() % 16;
+        }
+    }
     void dial() {
         instance_ = cluster_.new_instance();
         const std::string instance = instance_;
@@ -185,10 +211,11 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
     [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
 
     SimulatedCluster& cluster_;
-    std::string instance_;
+    std::string instance_, name_;
     bool draining_ = false;
     TimeNs parted_until_ = 0;
     ServerMachine machine_;
+    bool is_liar_, is_incapable_;
     SimulatedRenderer renderer_;
 };
 

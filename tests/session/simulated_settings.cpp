@@ -40,15 +40,24 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
         s.new_states = 1;
         s.calm_at = 2 * k_second_ns;
     }
+    if (often(3)) s.audit = often(2) ? 1 : 0.3;
+    if (often(4)) s.incapable = 1;
+    if (often(2)) {
+        s.liars = 1 + int(below(2));
+        s.lie = often(2) ? 0.01f : 0.3f * rng.next_float();
+    }
     return s;
 }
 
 std::string ClusterSettings::describe() const {
     return fmt::format(
         "{} servers, {}x{} in blocks of {}, {}+{} samples in rounds of {}, {}, {}, at least {}, lose {:.2f}, "
-        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, calm at {:.1f} s",
+        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, calm at {:.1f} s, {} "
+        "liars of {:.2f}, {} incapable, {:.1f} "
+        "audited",
         servers, width, height, block, spp, direct_spp, round_samples, name_of(schedule), name_of(detector),
-        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, to_seconds(calm_at));
+        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, to_seconds(calm_at),
+        liars, lie, incapable, audit);
 }
 
 void ClusterTotals::add(const ClusterTotals& other) {
@@ -70,6 +79,12 @@ void ClusterTotals::add(const ClusterTotals& other) {
     bad_messages += other.bad_messages;
     deaths += other.deaths;
     most_leases = std::max(most_leases, other.most_leases);
+    bans += other.bans;
+    lies += other.lies;
+    audited += other.audited;
+    unmasked += other.unmasked;
+    undone += other.undone;
+    failures += other.failures;
     virtual_time += other.virtual_time;
     ledger.granted += other.ledger.granted;
     ledger.accepted += other.ledger.accepted;

@@ -24,7 +24,7 @@ RenderSettings small_frame() {
 /// The work of a small frame, with one server to give rounds to. Times are all zero: nothing here expires.
 struct SmallWork {
     EventStore store;
-    FrameWork work{{16, 4}, store};
+    FrameWork work{{.block_size = 16, .round_samples = 4, .can_undo = true}, store};
 
     explicit SmallWork(const RenderSettings& settings = small_frame()) { begin(settings, Epoch{1}); }
 
@@ -138,6 +138,51 @@ TEST_CASE("there is a picture once each block has a round of each part") {
     CHECK(!frame.work.complete());
     frame.begin(small_frame(), Epoch{2});
     CHECK(!frame.work.has_image());
+}
+
+TEST_CASE(
+    "a unit that is undone is black, its rounds are open again, and done again it holds the same light") {
+    SmallWork frame;
+    frame.finish(LightPart::indirect);
+    const auto finished = frame.work.indirect().sums();
+    const std::vector<PixelSum> before(finished.begin(), finished.end());
+    CHECK(frame.work.undo(7, 0) == 3);
+    CHECK(frame.work.undo(7, 0) == 0);
+    CHECK(frame.work.indirect_ledger().audit());
+    CHECK_FALSE(frame.work.has_image());
+    CHECK(frame.work.indirect_progress() == doctest::Approx(14.0 / 15));
+    CHECK(frame.work.indirect().samples_of_block(7) == 0);
+    const PixelRect rect = frame.work.rect_of(7);
+    CHECK(frame.work.indirect().sum_at(rect.x, rect.y) == PixelSum{});
+    CHECK(frame.work.indirect().sum_at(rect.x - 1, rect.y) != PixelSum{});
+
+    CHECK(frame.finish(LightPart::indirect) == 3);
+    CHECK(frame.work.indirect_ledger().audit());
+    const auto again = frame.work.indirect().sums();
+    CHECK(std::vector<PixelSum>(again.begin(), again.end()) == before);
+}
+
+TEST_CASE("what another run brought stays when a unit is undone, and when the frame begins anew") {
+    SmallWork first, frame;
+    for (int i = 0; i < 20; ++i)
+        REQUIRE(first.commit(LightPart::indirect, *first.grant(LightPart::indirect)) == Verdict::accepted);
+    FrameSnapshot snapshot;
+    first.work.snapshot(snapshot);
+    REQUIRE(frame.work.restore(snapshot));
+    const auto is_as_restored = [&] {
+        const auto sums = frame.work.indirect().sums();
+        return std::vector<PixelSum>(sums.begin(), sums.end()) == snapshot.indirect.sums &&
+               frame.work.indirect_ledger().rounds_committed() == 20 && frame.work.indirect_ledger().audit();
+    };
+    CHECK(is_as_restored());
+    CHECK(frame.finish(LightPart::indirect) == 25);
+    for (std::uint32_t unit = 0; unit < frame.work.grid().count(); ++unit) frame.work.undo(unit, 0);
+    CHECK(is_as_restored());
+    CHECK(frame.finish(LightPart::indirect) == 25);
+    frame.work.begin_anew(small_frame(), Epoch{2}, 0);
+    frame.work.set_servers({{k_server, 0}});
+    CHECK(is_as_restored());
+    CHECK(frame.finish(LightPart::indirect) == 25);
 }
 
 TEST_CASE("a stopped frame grants nothing more, and is complete when nothing is outstanding") {

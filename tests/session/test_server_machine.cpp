@@ -99,3 +99,46 @@ TEST_CASE("a client that grants without end and takes no answer does not fill th
     say(lease);
     CHECK(world.begun.size() == 1);
 }
+
+TEST_CASE("a banned server leaves at once, is silent until the ban's end, and then says HELLO") {
+    const TemporaryFolder folder;
+    StoppableWorld world;
+    ServerMachine server({"server", "0", "build", 1, 7, "client"}, SceneCache(folder.path()), world);
+    TimeNs now = k_second_ns;
+    const auto say = [&](Message message) {
+        const Channel channel = k_message_table[message.index()].channel;
+        server.on_message(encode(std::move(message)), channel, now);
+        server.on_timers(now);
+    };
+    const auto says_hello = [&] {
+        world.sent.clear();
+        server.on_timers(now);
+        return !world.sent.empty();
+    };
+    const std::string packed = pack(PackValue(encode_state(small_state())));
+    const message::Welcome welcome{77, ServerId{1}, 250, 5000, 2, Epoch{1}, 0, hash_text(packed), packed};
+    server.on_linked(std::string(16, 'i'), now);
+    say(welcome);
+    REQUIRE(server.welcomed());
+
+    say(message::Reject{RejectCode::version, "A flipped bit made a HELLO of something.", 0});
+    CHECK(server.welcomed());
+    say(message::Reject{RejectCode::banned, "It misbehaved too often.", 30'000});
+    CHECK_FALSE(server.linked());
+    CHECK_FALSE(server.ended());
+    server.on_linked(std::string(16, 'j'), now);
+    CHECK_FALSE(says_hello());
+    now += 30 * k_second_ns - 1;
+    CHECK_FALSE(says_hello());
+    ++now;
+    CHECK(server.next_timer(now) == now);
+    CHECK(says_hello());
+
+    // It hears of the ban once more, by the answer to its HELLO; but then the client ends, and another one may come.
+    say(message::Reject{RejectCode::banned, "It misbehaved too often.", 30'000});
+    now += k_second_ns;
+    CHECK_FALSE(says_hello());
+    server.on_connection_lost(now);
+    now += k_second_ns;
+    CHECK(says_hello());
+}

@@ -66,28 +66,30 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
     CHECK_MESSAGE(failed == 0, failed, " of ", count, " worlds broke:\n", failures);
 
     const LedgerCounts& c = all.ledger;
-    MESSAGE(
-        fmt::format("{} worlds, {} events, {} messages, {:.0f} s of virtual time; messages: {} lost, {} "
-                    "doubled, {} damaged, {} "
-                    "parted, {} unreachable, {} refused; processes: {} killed, {} frozen, {} parted, {} "
-                    "drained, {} joined, {} "
-                    "pauses and {} restarts of the client, {} new states, {} given up; leases: {} granted, "
-                    "{} expired, {} "
-                    "revoked, {} released, {} superseded, {} dropped, {} copied, {} reallocated; results: {} "
-                    "accepted ({} late), "
-                    "{} duplicate, {} stale, {} unknown",
-                    count, all.events, all.messages, to_seconds(all.virtual_time), all.lost, all.doubled,
-                    all.damaged, all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes,
-                    all.partitions, all.drains, all.joins, all.pauses, all.restarts, all.new_states,
-                    all.deaths, c.granted, c.expired, c.revoked, c.released, c.superseded, c.dropped,
-                    c.copied, c.reallocated, c.accepted, c.late, c.duplicates, c.stale, c.unknown));
+    MESSAGE(fmt::format(
+        "{} worlds, {} events, {} messages, {:.0f} s of virtual time; messages: {} lost, {} "
+        "doubled, {} damaged, {} "
+        "parted, {} unreachable, {} refused; processes: {} killed, {} frozen, {} parted, {} "
+        "drained, {} joined, {} "
+        "pauses and {} restarts of the client, {} new states, {} given up, {} banned, {} failures; {} lies, "
+        "{} rounds audited, {} unmasked, {} undone; leases: {} granted, "
+        "{} expired, {} "
+        "revoked, {} released, {} superseded, {} dropped, {} copied, {} reallocated; results: {} "
+        "accepted ({} late), "
+        "{} duplicate, {} stale, {} unknown",
+        count, all.events, all.messages, to_seconds(all.virtual_time), all.lost, all.doubled, all.damaged,
+        all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.drains,
+        all.joins, all.pauses, all.restarts, all.new_states, all.deaths, all.bans, all.failures, all.lies,
+        all.audited, all.unmasked, all.undone, c.granted, c.expired, c.revoked, c.released, c.superseded,
+        c.dropped, c.copied, c.reallocated, c.accepted, c.late, c.duplicates, c.stale, c.unknown));
     if (count < 2000) return;
     CHECK(all.most_leases > 2 * k_least_credits);  // Wires are slow at times, and rounds are short.
     // The simulation is worth its name only if everything does happen in it.
     for (const std::uint64_t happened :
          {all.lost,     all.doubled,    all.damaged,    all.parted,    all.unreachable, all.bad_messages,
           all.kills,    all.freezes,    all.partitions, all.drains,    all.joins,       all.pauses,
-          all.restarts, all.new_states, all.deaths,     c.expired,     c.revoked,       c.released,
+          all.restarts, all.new_states, all.deaths,     all.bans,      all.failures,    all.lies,
+          all.audited,  all.unmasked,   all.undone,     c.expired,     c.revoked,       c.released,
           c.superseded, c.dropped,      c.copied,       c.reallocated, c.late,          c.duplicates,
           c.stale,      c.unknown})
         CHECK(happened >= 5);

@@ -137,6 +137,14 @@ class Mutants(unittest.TestCase):
                    ("    if (sealed && frames[0] != message_head(version, type, frames[1]))\n",
                     "    if (false)\n"), seeds=500, PATHSCOPE_DAMAGE="20")
 
+    def test_an_audit_compares_nothing(self):
+        self.check("src/cluster/audit.cpp", ("    if (item.result == result) {\n", "    if (true) {\n"), seeds=300)
+
+    def test_undoing_forgets_a_round(self):
+        """The first round of a unit stays committed, without its light."""
+        self.check(LEDGER, ("        if (is_kept || !committed(round)) continue;\n",
+                            "        if (index == 0 || is_kept || !committed(round)) continue;\n"), seeds=300)
+
     def test_a_server_says_ready_only_once(self):
         self.check(SERVER, ("    send_answer(message::Credit{session_, credits_, received_});\n    if (phase_ == Phase::work) send_ready();\n", ""))
 

@@ -12,6 +12,10 @@
 namespace pathscope {
 namespace {
 
+/// Of the rounds of servers that somebody else started: it costs as much of their time. Local ones are this very build, on
+/// this very machine.
+constexpr double k_audit_of_strangers = 0.02;
+
 void add_image_options(CLI::App& app, RenderOptions& options) {
     app.add_option("SCENE", options.scene, "a scene file (.json), or a bare .obj")->required();
     app.add_option("-o,--output", options.outputs, "an .exr (layers), .png or .pfm; may be given again")
@@ -110,6 +114,10 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
               "what servers compute: indirect light, or arithmetic, to test servers with");
     add_lever(app, "--schedule", client.schedule, "who renders which block");
     add_lever(app, "--detector", client.detector, "when a silent server counts as dead");
+    app.add_option("--audit", client.audit.share,
+                   "share of rounds that are rendered twice and compared (0.02 with --listen, else 0)")
+        ->check(CLI::Range(0.0, 1.0))
+        ->type_name("SHARE");
     add_lever(app, "--order", client.order, "which blocks come first");
     app.add_option("--block", client.block_size, "pixels along a block's side (32)")
         ->check(CLI::Range(1, k_max_block_size))
@@ -264,6 +272,8 @@ Result<std::variant<RenderOptions, std::string>> parse_options(int argc, const c
     options.client.ports_were_chosen = app.count("--ports") > 0;
     if (const auto safe = check_keys(options, keys); !safe) return safe.error();
     if (options.client.listens && app.count("--min-servers") == 0) options.client.min_servers = 1;
+    if (options.client.listens && app.count("--audit") == 0)
+        options.client.audit.share = k_audit_of_strangers;
     return std::variant<RenderOptions, std::string>(std::move(options));
 }
 

@@ -18,7 +18,10 @@
 ///                             lose(server, ban_sentence(*ban));
 ///     on HELLO:           if (const auto ban = conduct.ban_of(who, now))
 ///                             reject(RejectCode::banned, ban_sentence(*ban), ban->left(now));
-///     on any message:     if (!conduct.may_send(who, now)) drop it;   // too many: report() it as a flood, once a second
+///     on any message:     if (!conduct.may_send(who, now)) drop it, and report_flood(who, now);
+///
+/// The allowance of a server is that of its connection, since several servers may have one key; and with each lease it
+/// is allowed an answer more: however fast it is, it is not the one who floods.
 ///
 /// No clock: `now` is an argument and never falls. Thread safety: one thread at a time.
 /// Test: tests/cluster/test_conduct.cpp
@@ -46,6 +49,7 @@ enum class Offence {
     corrupt,        ///< A result whose size or hash is wrong.
     failed,         ///< It could not do its work.
     flood,          ///< More messages than anyone needs.
+    false_result,   ///< Light that is not that of its samples: an audit found it (audit.hpp).
 };
 
 inline constexpr std::array k_offence_names{
@@ -57,10 +61,12 @@ inline constexpr std::array k_offence_names{
     EnumName{Offence::corrupt, "corrupt"},
     EnumName{Offence::failed, "failed"},
     EnumName{Offence::flood, "flood"},
+    EnumName{Offence::false_result, "false_result"},
 };
 constexpr const auto& enum_table(Offence) { return k_offence_names; }
 
-/// What an offence costs, where `ban_at` is 10. A corrupt result is dearest: it is work lost, and cannot be chance.
+/// What an offence costs, where `ban_at` is 10. A corrupt result is dear: it is work lost, and cannot be chance. A false
+/// one is a ban at once, and the longest: it was believed.
 [[nodiscard]] constexpr double points_of(Offence offence) {
     switch (offence) {
         case Offence::unknown_type:
@@ -75,6 +81,8 @@ constexpr const auto& enum_table(Offence) { return k_offence_names; }
             return 2;
         case Offence::corrupt:
             return 4;
+        case Offence::false_result:
+            return 1000;
     }
     return 1;
 }
@@ -86,8 +94,16 @@ struct ConductParams {
     double growth = 4;
     TimeNs longest_ban = 3600 * k_second_ns;
     TimeNs forgive_after = 600 * k_second_ns;
-    /// Messages of one peer: far more than a server sends whose rounds take a millisecond.
-    RateLimit messages{2000, 10'000};
+    /// Messages of one server, besides the answers to its leases: pieces of a scene at a gigabyte per second.
+    RateLimit messages{5000, 20'000};
+    /// Messages of all that said no HELLO and are known by one name: a thousand servers on a machine, whose client
+    /// was started again and does not know them, send 16,000 a second.
+    RateLimit strangers{50'000, 100'000};
+};
+
+/// What a connection tells of the peer at its other end, and the peer cannot choose. Either may be unknown.
+struct Sender {
+    std::string key, address;
 };
 
 struct Ban {
@@ -113,14 +129,16 @@ class Conduct {
     explicit Conduct(const ConductParams& params = {}) : params_(params) {}
 
     /// Books an offence. The ban that it leads to, if it does. Who is banned already gets no further points: it is
-    /// not heard, so it cannot know.
+    /// not heard, so it cannot know; but what it gave before may turn out to be false.
     std::optional<Ban> report(const std::string& who, Offence offence, TimeNs now);
 
     [[nodiscard]] std::optional<Ban> ban_of(const std::string& who, TimeNs now) const;
     [[nodiscard]] double points(const std::string& who, TimeNs now) const;
 
-    /// Books a message. False if the peer has used up its allowance.
+    /// Books a message of a stranger. False if its name has used up its allowance.
     bool may_send(const std::string& who, TimeNs now);
+    /// Books an offence each second in which messages had to be dropped.
+    std::optional<Ban> report_flood(const std::string& who, TimeNs now);
 
     [[nodiscard]] std::size_t remembered() const { return records_.size(); }
 
@@ -130,6 +148,7 @@ class Conduct {
         TimeNs points_at = 0;
         Ban ban;
         TokenBucket allowance;
+        TimeNs flood_reported_until = 0;
     };
 
     Record& record_of(const std::string& who, TimeNs now);

@@ -17,7 +17,7 @@
 ///   rounds    each is committed at most once; when complete(), exactly once
 ///   leases    granted = outstanding + returned + superseded + released + expired + revoked + dropped
 ///   results   received = accepted + duplicates + stale + unknown + mismatched
-///   between   accepted = returned + late;  committed = accepted + restored
+///   between   accepted = returned + late;  committed = accepted + restored - undone
 ///   bounded   records exist only for rounds that were granted and are not committed, at most
 ///             k_leases_per_round each; a committed round is remembered by what is *absent*
 ///
@@ -169,6 +169,7 @@ struct LedgerCounts {
     std::uint64_t late = 0;         ///< Accepted after the lease had ended.
     std::uint64_t reallocated = 0;  ///< Granted again, to another server than the last.
     std::uint64_t copied = 0;       ///< Granted as a second lease.
+    std::uint64_t undone = 0;       ///< Committed rounds that were opened again.
 };
 
 /// What a checkpoint keeps of a unit: the rounds [0, reached) are committed, except the missing ones.
@@ -197,6 +198,13 @@ class Ledger {
     /// Opens rounds of a staged plan: the unit shall have so many in all. Requires: no fewer than before, and at most
     /// plan().rounds_of(unit).
     void open(std::uint32_t unit, std::uint32_t rounds);
+
+    /// Opens the committed rounds of a unit again, but for those that are `kept`: what they brought is not believed any more,
+    /// and whoever merged it takes it back. Returns how many.
+    std::size_t undo(std::uint32_t unit, const UnitSnapshot& kept, TimeNs now);
+
+    /// A number for a lease that is no round's of this account.
+    [[nodiscard]] LeaseId new_lease_id() { return LeaseId{++last_lease_}; }
 
     /// No more grants; results of leases already granted are still welcome.
     void stop() { stopped_ = true; }
@@ -228,6 +236,10 @@ class Ledger {
     // -- View (schedules, panels, statistics) ---------------------------------------------------------------
     [[nodiscard]] const LedgerPlan& plan() const { return plan_; }
     [[nodiscard]] bool stopped() const { return stopped_; }
+    /// Wraps around to an index that no plan has if `first` lies before the unit's samples.
+    [[nodiscard]] RoundKey round_at(std::uint32_t unit, std::uint32_t first) const {
+        return {unit, (first - plan_.first_sample(unit)) / plan_.round_samples_of(unit)};
+    }
     [[nodiscard]] RoundKey key_of(const Lease& lease) const { return round_at(lease.unit, lease.first); }
 
     /// Rounds that may be granted or were; grows only by open().
@@ -289,10 +301,6 @@ class Ledger {
     };
 
     [[nodiscard]] bool committed(RoundKey round) const;
-    /// Wraps around to an index that no plan has if `first` lies before the unit's samples.
-    [[nodiscard]] RoundKey round_at(std::uint32_t unit, std::uint32_t first) const {
-        return {unit, (first - plan_.first_sample(unit)) / plan_.round_samples_of(unit)};
-    }
     [[nodiscard]] std::uint32_t samples_before(std::uint32_t unit, std::uint32_t rounds) const;
     Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration,
                UnitReason reason);
@@ -323,6 +331,7 @@ class Ledger {
     std::uint64_t begun_ = 0;
     std::uint64_t restored_ = 0;
     std::uint64_t accepted_before_ = 0;  ///< counts_.accepted when this epoch began.
+    std::uint64_t undone_before_ = 0;    ///< counts_.undone then.
     std::uint64_t last_lease_ = 0;
     std::uint64_t last_lease_before_ = 0;  ///< last_lease_ when this epoch began.
     LedgerCounts counts_;

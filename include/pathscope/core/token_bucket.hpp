@@ -60,6 +60,12 @@ class TokenBucket {
         if (limit_.limits()) tokens_ -= double(count);
     }
 
+    /// Puts some back, as far as the bucket holds them.
+    void give(std::size_t count, TimeNs now) {
+        fill(now);
+        if (limit_.limits()) tokens_ = std::min(limit_.depth, tokens_ + double(count));
+    }
+
     /// Takes one, if there is one.
     bool allow(TimeNs now) {
         if (available(now) == 0) return false;

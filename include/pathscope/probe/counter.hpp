@@ -1,7 +1,7 @@
 #pragma once
 /// What is counted, by name: one table for the event store, `--stats`, the window and lesson checks.
 ///
-/// Every counter only rises. A total exists for the whole run, and one per server (server 0 is the client and
+/// Every counter only rises, but for EventStore::take_back. A total exists for the whole run, and one per server (server 0 is the client and
 /// its own renderer). Test: tests/probe/test_event_store.cpp
 
 #include <cstddef>
@@ -33,7 +33,11 @@ enum class Counter {
     messages_in,
     messages_out,
     servers_joined,
-    died,  ///< 1 for a server that was declared dead; in total, how many.
+    died,            ///< 1 for a server that was declared dead; in total, how many.
+    rounds_audited,  ///< Rounds that were rendered twice and compared; of the server that gave the first result.
+    audits_differing,  ///< Results that an audit found to be false.
+    rounds_undone,     ///< Merged rounds that were taken back, since their block held false light.
+    banned,            ///< Bans, of servers and of others that misbehaved.
 };
 
 inline constexpr std::array k_counter_names{
@@ -60,6 +64,10 @@ inline constexpr std::array k_counter_names{
     EnumName{Counter::messages_out, "messages_out"},
     EnumName{Counter::servers_joined, "servers_joined"},
     EnumName{Counter::died, "died"},
+    EnumName{Counter::rounds_audited, "rounds_audited"},
+    EnumName{Counter::audits_differing, "audits_differing"},
+    EnumName{Counter::rounds_undone, "rounds_undone"},
+    EnumName{Counter::banned, "banned"},
 };
 constexpr const auto& enum_table(Counter) { return k_counter_names; }
 

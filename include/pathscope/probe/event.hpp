@@ -80,6 +80,7 @@ enum class UnitReason {
     stale_epoch,    ///< refused: of an old epoch.
     unknown_lease,  ///< refused: no such lease.
     mismatched,     ///< refused: not what the lease says.
+    undone,         ///< reopened: the unit holds light of a server that gave false results.
 };
 
 struct UnitEvent {
@@ -153,6 +154,7 @@ inline constexpr std::array k_unit_reason_names{
     EnumName{UnitReason::stale_epoch, "stale_epoch"},
     EnumName{UnitReason::unknown_lease, "unknown_lease"},
     EnumName{UnitReason::mismatched, "mismatched"},
+    EnumName{UnitReason::undone, "undone"},
 };
 constexpr const auto& enum_table(UnitReason) { return k_unit_reason_names; }
 

@@ -93,6 +93,9 @@ class EventStore {
     };
     void count_all(std::initializer_list<Count> counts, ServerId server = k_local_server);
 
+    /// What was counted for light that is in the picture no more. Requires: it was counted.
+    void take_back(std::initializer_list<Count> counts, ServerId server);
+
     /// What other runs counted before, which this one goes on from: in the overall totals, and of no server.
     void count_earlier(std::initializer_list<Count> counts);
 

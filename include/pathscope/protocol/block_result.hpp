@@ -16,6 +16,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pathscope/core/hash.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/exact_sum.hpp"
 #include "pathscope/image/wire_format.hpp"
@@ -25,6 +26,9 @@
 namespace pathscope {
 
 inline constexpr std::string_view k_blocks_strategy = "blocks";
+
+/// Of the sums themselves, however they travel: equal light has equal hashes.
+[[nodiscard]] Digest hash_of_sums(std::span<const PixelSum> sums);
 
 void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, Codec codec = Codec::shuffle_zstd);
 /// The same in a format that may lose bits (image/wire_format.hpp).

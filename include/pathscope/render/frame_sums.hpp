@@ -33,6 +33,10 @@ class FrameSums {
     /// the block's samples stay within k_max_samples_per_pixel.
     void add(const Round& round, std::span<const PixelSum> sums);
 
+    /// Puts a block back to what it was. Requires: `to` is empty for black, or the sums of a whole frame, of which the block's
+    /// are in_range for so many samples.
+    void reset_block(std::uint32_t block, std::uint32_t samples, std::span<const PixelSum> to);
+
     [[nodiscard]] const BlockGrid& grid() const { return grid_; }
     [[nodiscard]] Quantum quantum() const { return quantum_; }
     [[nodiscard]] const PixelSum& sum_at(int x, int y) const {

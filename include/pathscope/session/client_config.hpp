@@ -11,6 +11,8 @@
 
 #include "pathscope/bvh/tree.hpp"
 #include "pathscope/cluster/adaptive.hpp"
+#include "pathscope/cluster/audit.hpp"
+#include "pathscope/cluster/conduct.hpp"
 #include "pathscope/cluster/failure_detector.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
@@ -46,6 +48,8 @@ struct ClientConfig {
     Strategy strategy = Strategy::blocks;  ///< What the servers compute. A checkpoint holds `blocks` only.
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;
+    AuditParams audit{};      ///< Without a secret, the session draws one.
+    ConductParams conduct{};  ///< How much misconduct of a server is too much.
     UnitOrder order = UnitOrder::spiral;
     int block_size = 32;
     std::uint32_t round_samples = 4;

@@ -19,8 +19,11 @@
 #include <string_view>
 #include <vector>
 
+#include "pathscope/cluster/audit.hpp"
 #include "pathscope/cluster/clock_offset.hpp"
 #include "pathscope/cluster/figures.hpp"
+#include "pathscope/cluster/conduct.hpp"
+#include "pathscope/cluster/contributions.hpp"
 #include "pathscope/cluster/lease_policy.hpp"
 #include "pathscope/cluster/peer.hpp"
 #include "pathscope/probe/event_store.hpp"
@@ -81,7 +84,8 @@ class ClientMachine {
     /// A local server was started; the frame waits for it a while.
     void expect_server(std::uint32_t pid, std::string name);
     void on_process_ended(std::uint32_t pid, std::string_view name, std::string_view how, TimeNs now);
-    void on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now);
+    void on_message(const std::string& instance, Frames frames, Channel channel, TimeNs now,
+                    const Sender& sender = {});
     void on_outcome(RoundOutcome& outcome, TimeNs now);
 
     /// Some connection ended; whose is not known. A process that died is unreachable then, and is given up at once: but not
@@ -109,7 +113,8 @@ class ClientMachine {
     // -- View -----------------------------------------------------------------------------------------------
 
     /// Nothing is left to wait for: the image is finished, or the time limit was reached and every block has samples.
-    [[nodiscard]] bool complete() const { return work_.complete(); }
+    /// And no audit is open.
+    [[nodiscard]] bool complete() const { return work_.complete() && (stopped_ || audit_.settled()); }
     [[nodiscard]] Progress progress() const;
     [[nodiscard]] ClusterFigures figures() const;  ///< client_figures.cpp
     [[nodiscard]] const FrameWork& work() const { return work_; }
@@ -117,16 +122,19 @@ class ClientMachine {
     [[nodiscard]] Epoch epoch() const { return work_.epoch(); }
     [[nodiscard]] std::uint64_t saturated() const { return saturated_; }
     [[nodiscard]] const std::vector<DroppedSample>& dropped() const { return dropped_; }
+    [[nodiscard]] const Conduct& conduct() const { return conduct_; }
 
   private:
     struct Server {
         std::string instance;
         std::string name;
+        std::string who;  ///< By which its conduct is known.
         std::uint32_t pid = 0;
         Peer peer;
         FailureDetector detector;
         ClockEstimate clock{};
         std::optional<TimeNs> round_trip{};  ///< The shortest of late.
+        TokenBucket allowance{};  ///< Of messages.
         Credits credits{0};
         SpeedEstimate speed{};
         Turnaround turnaround{};
@@ -135,9 +143,15 @@ class ClientMachine {
 
         [[nodiscard]] bool stays() const { return peer.alive() && peer.state() != PeerState::draining; }
     };
-    /// A round of the client's own renderer: one part of it, or both.
+    /// A round of the client's own renderer: one part of it, or both; or one that was rendered before.
     struct LocalWork {
         std::optional<Lease> direct, indirect;
+        std::optional<AuditedRound> audit;
+        Epoch epoch;
+    };
+    /// Whose light is in the frame, though it may be gone.
+    struct Author {
+        std::string name, who;
     };
     /// A process that this client started.
     struct LocalServer {
@@ -160,13 +174,19 @@ class ClientMachine {
     bool send(Channel channel, const std::string& instance, Message message, ServerId peer = k_local_server);
     void record(EventBody body);
     void enforce_time_limit();
+    void begin_epoch(const PackMap& changes, bool same_frame);
     template <class Other>
     void on(Server&, Other&) {}  // HELLO is handled before; the rest never decodes for a client.
+
+    // client_conduct.cpp: who misbehaves is shut out for a while.
+    void offend(const std::string& who, Offence offence);
+    void shut_out(const std::string& who, const Ban& ban);
+    void reject_banned(const std::string& instance, const Ban& ban);
 
     // client_joining.cpp: from HELLO to READY, and the way out.
     [[nodiscard]] std::optional<std::string> reason_to_reject(const std::string& instance,
                                                               const message::Hello& hello) const;
-    void on_hello(const std::string& instance, const message::Hello& hello);
+    void on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender);
     void on(Server& server, message::SnapshotRequest& message);
     void on(Server& server, message::ManifestRequest& message);
     void on(Server& server, message::PieceRequest& message);
@@ -205,6 +225,23 @@ class ClientMachine {
     void settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result);
     void count_result(const RoundResult& result, ServerId server);
     void cancel_superseded(const std::vector<Lease>& leases);
+    void cancel(const Lease& lease);
+    void begin_local(LocalWork work);
+    void release(LeaseId lease, ServerId server);
+    void revoke(ServerId server);
+
+    // client_audit.cpp: a second opinion.
+    void note_merged(LightPart part, const ResultClaim& claim, const RoundResult& result,
+                     std::span<const PixelSum> sums);
+    std::optional<Lease> grant_audit(ServerId server, TimeNs duration);
+    [[nodiscard]] std::optional<AuditedRound> next_local_audit(bool disputes_only) const;
+    void on_opinion(const ResultClaim& claim, std::span<const PixelSum> sums);
+    [[nodiscard]] Digest hash_as_sent(std::vector<PixelSum> sums, std::uint32_t samples) const;
+    void on_own_opinion(const LocalWork& work, const RoundOutcome& outcome);
+    void convict(const Author& liar, const AuditedRound& item);
+    std::size_t undo(const std::vector<std::uint32_t>& units);
+    std::size_t begin_anew();
+    std::uint64_t take_back(const std::vector<Contribution>& gave, bool indirect);
 
     ClientConfig config_;
     ClientJob job_;
@@ -235,6 +272,10 @@ class ClientMachine {
     int probes_left_ = 0;                      ///< Of connections, after one was lost.
     TimeNs next_probe_ = 0;
 
+    Conduct conduct_;
+    Audit audit_;
+    Contributions gave_direct_, gave_indirect_;  ///< In this epoch, if audits are asked for.
+    std::map<ServerId, Author> authors_;         ///< Those that live, or gave something in this epoch.
     FrameWork work_;
     std::vector<PixelSum> arrived_;  ///< Of the tile at hand: its memory serves for all.
     std::uint64_t last_ticket_ = 0;

@@ -34,6 +34,7 @@ struct WorkPlan {
     ScheduleKind schedule = ScheduleKind::pull;
     UnitOrder order = UnitOrder::spiral;
     SamplingRule sampling{};
+    bool can_undo = false;  ///< Keeps what restore() brought, for undo() and begin_anew().
 };
 
 class FrameWork {
@@ -44,6 +45,13 @@ class FrameWork {
     /// given rounds has to be said again. Requires: with passes, each part's samples are none or at least
     /// least_staged_budget(round_samples).
     std::vector<Lease> begin(const RenderSettings& settings, Epoch epoch, TimeNs now);
+
+    /// The same frame from where this run began with it: nothing, or what restore() brought.
+    std::vector<Lease> begin_anew(const RenderSettings& settings, Epoch epoch, TimeNs now);
+
+    /// Puts the indirect light of a unit back to where this run began with it; its rounds are open again. Returns how many.
+    /// With passes, what a unit holds has decided about others: only begin_anew() helps. Requires: plan().can_undo, no passes.
+    std::size_t undo(std::uint32_t unit, TimeNs now);
 
     /// Who may be given indirect rounds.
     void set_servers(std::vector<ServerShare> servers) { schedule_.set_servers(std::move(servers)); }
@@ -64,7 +72,10 @@ class FrameWork {
     }
 
     [[nodiscard]] Round round_of(const Lease& lease) const {
-        return grid_.round(block_of(lease.unit), lease.first, lease.count);
+        return round_of(lease.unit, {lease.first, lease.count});
+    }
+    [[nodiscard]] Round round_of(std::uint32_t unit, SampleRange samples) const {
+        return grid_.round(block_of(unit), samples.first, samples.count);
     }
     /// Requires: a unit of a ledger's plan.
     [[nodiscard]] PixelRect rect_of(std::uint32_t unit) const { return grid_.rect(block_of(unit)); }
@@ -146,6 +157,7 @@ class FrameWork {
     BlockGrid grid_;
     Epoch epoch_;
     Part direct_, indirect_;
+    std::optional<FrameSnapshot> first_;  ///< What restore() brought.
     std::uint32_t passes_finished_ = 0;
     bool last_pass_finished_ = false;
     Schedule schedule_, direct_schedule_;

@@ -51,9 +51,7 @@ class ServerWorld {
     virtual bool send(Channel channel, Frames&& frames) = 0;
 
     /// Puts the result of a round into its tile.
-    virtual void fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const {
-        put_block_result(tile, result.sums, format);
-    }
+    virtual void fill_tile(message::Tile& tile, const RoundResult& result, WireFormat format) const;
 
     /// Begins a round. Each has one outcome: on_outcome(). A cancelled one has it soon.
     virtual void begin(RoundJob job) = 0;
@@ -78,6 +76,8 @@ class ServerMachine {
     void on_linked(std::string instance, TimeNs now);
     /// The client's door did not let it in, and told so on the connection itself: new sockets are needed.
     void on_refused(TimeNs now);
+    /// The connection to the client ended, and ZeroMQ makes another one: whoever answers there next may know of no ban.
+    void on_connection_lost(TimeNs now);
     void on_message(Frames frames, Channel channel, TimeNs now);
     void on_outcome(RoundOutcome& outcome, TimeNs now);
     void on_loaded(LoadedScene& loaded, TimeNs now);
@@ -177,6 +177,7 @@ class ServerMachine {
     // Timers.
     TimeNs last_heard_ = 0;
     TimeNs next_hello_ = 0;
+    TimeNs banned_until_ = 0;  ///< The client said so; it hears nothing before.
     TimeNs hello_pause_ = 0;
     TimeNs next_ping_ = 0;
     std::optional<TimeNs> missed_since_;  ///< A PING told of an INPUT that has not come.
