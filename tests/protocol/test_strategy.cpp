@@ -21,6 +21,12 @@ message::Tile flat_tile(std::uint32_t first, std::uint32_t count) {
 
 }  // namespace
 
+TEST_CASE("each strategy has a name, and the name of each is its own") {
+    for (const auto& [strategy, name] : k_strategy_names) CHECK(from_name<Strategy>(name) == strategy);
+    CHECK(depends_on_build(Strategy::blocks));
+    CHECK(!depends_on_build(Strategy::flat));
+}
+
 TEST_CASE("flat: the sums of samples 5, 6 and 7 of the block at (32, 64)") {
     const auto sums = flat_sums(k_rect, 5, 3);
     REQUIRE(sums.size() == 6);

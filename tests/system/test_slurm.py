@@ -22,8 +22,8 @@ from small_slurm import CannotBeHad, SmallSlurm
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 SCRIPT = pathlib.Path("tools/cluster/slurm/servers.sbatch").resolve()
-JOB = ["--size", "96x64", "--spp", "64", "--direct-spp", "1", "--seed", "7", "--block", "16", "--round", "2"]
-SPEED_CAP = 250  # Samples per second: the frame would take 16 servers 100 s, a round 2 s. A quick one ends it.
+JOB = ["--size", "64x48", "--spp", "24", "--direct-spp", "1", "--seed", "7", "--block", "8", "--round", "2"]
+SPEED_CAP = 64  # Samples per second: the frame would take 16 servers over a minute, a round 2 s. A quick one ends it.
 SERVERS = 16
 PATIENCE_S = 120  # What takes longer has failed.
 
