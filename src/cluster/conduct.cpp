@@ -9,11 +9,11 @@
 namespace pathscope {
 
 std::string ban_sentence(const Ban& ban, TimeNs now) {
+    const TimeNs seconds = (ban.left(now) + k_second_ns - 1) / k_second_ns;
     if (ban.last_offence == Offence::false_result)
-        return fmt::format("It gave a false result and may come back in {:.0f} s.",
-                           std::ceil(to_seconds(ban.left(now))));
-    return fmt::format("It misbehaved too often (last: {}) and may come back in {:.0f} s.",
-                       name_of(ban.last_offence), std::ceil(to_seconds(ban.left(now))));
+        return fmt::format("It gave a false result and may come back in {} s.", seconds);
+    return fmt::format("It misbehaved too often (last: {}) and may come back in {} s.",
+                       name_of(ban.last_offence), seconds);
 }
 
 std::string conduct_name(std::string_view public_key, std::string_view name, std::string_view address) {

@@ -81,8 +81,10 @@ void ClientMachine::on_own_opinion(const LocalWork& work, const RoundOutcome& ou
     const AuditedRound& item = *work.audit;
     if (work.epoch != work_.epoch()) return;
     if (!outcome.result) return audit_.release_client(item.round);
+    const std::size_t unsettled = audit_.unsettled();
     const auto liars = audit_.on_truth(item.round, hash_as_sent(outcome.result->sums, item.samples.count));
-    store_.count(Counter::rounds_audited, 1, item.author);
+    // It may be that it was undone meanwhile.
+    store_.count(Counter::rounds_audited, unsettled - audit_.unsettled(), item.author);
     std::vector<Author> convicted;  // Their names are forgotten with the epoch that the first one ends.
     for (const ServerId liar : liars) {
         store_.count(Counter::audits_differing, 1, liar);

@@ -167,7 +167,7 @@ void ClientMachine::on_message(const std::string& instance, Frames frames, Chann
     Decoded decoded = decode(std::move(frames), Role::client, channel);
     if (!decoded) {
         count_dropped(id, decoded.error().sentence, channel);
-        if (!conduct_.ban_of(who, now_)) reject_undecodable(instance, decoded.error(), channel);
+        reject_undecodable(instance, decoded.error(), channel);
         if (const auto offence = offence_of(decoded.error().fault)) offend(who, *offence);
         return;
     }
