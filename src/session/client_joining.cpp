@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "pathscope/core/log.hpp"
-#include "pathscope/session/build_identity.hpp"
 
 namespace pathscope {
 namespace {
@@ -21,31 +20,30 @@ TimeNs dead_after_of(DetectorKind kind) {
 
 }  // namespace
 
-std::optional<std::string> ClientMachine::reason_to_reject(const std::string& instance,
-                                                           const message::Hello& hello) const {
-    if (hello.instance != instance) return "HELLO names another instance than its connection has.";
-    if (hello.build != build_identity())
-        return fmt::format(
-            "The client is '{}', this server is '{}': their pixels could differ in the last bit. Run "
-            "the same build on both machines.",
-            build_identity(), hello.build);
-    return std::nullopt;
+/// Whether it may come in. If not, both sides are told why.
+bool ClientMachine::admits(const std::string& instance, const message::Hello& hello,
+                           const std::optional<BitsMisfit>& misfit) {
+    std::optional<message::Reject> reject;
+    if (hello.instance != instance)
+        reject = {RejectCode::malformed, "HELLO names another instance than its connection has.", 0};
+    else if (misfit && !config_.relaxed)
+        reject = {misfit->code, misfit->sentence, 0};
+    if (!reject) return true;
+    log_warning(fmt::format("Refused the server {}: {}", hello.name, reject->text));
+    send(Channel::monitor, instance, std::move(*reject));
+    return false;
 }
 
 void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello) {
-    if (const auto reason = reason_to_reject(instance, hello)) {
-        log_warning(fmt::format("Refused the server {}: {}", hello.name, *reason));
-        send(Channel::monitor, instance,
-             message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed, *reason,
-                             0});
-        return;
-    }
+    const std::optional<BitsMisfit> misfit = bits_misfit(own_bits(), {hello.build, hello.golden});
+    if (!admits(instance, hello, misfit)) return;
     auto found = servers_.find(instance);
     if (found != servers_.end()) {
         // It did not hear the WELCOME, or forgot its work: it starts over under the same id.
         Server& server = found->second;
         work_.indirect_ledger().revoke(server.peer.id(), now_);
         server.credits.clear();
+        server.progress = ProgressWatch(heartbeat_);
         step_peer(server, PeerCause::state_lost, "It said HELLO again.");
     } else {
         if (servers_.size() >= k_max_servers) {
@@ -56,7 +54,8 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         const ServerId id{++last_server_};
         found = servers_
                     .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
-                                              FailureDetector(config_.detector, now_)})
+                                              FailureDetector(config_.detector, now_),
+                                              ProgressWatch(heartbeat_)})
                     .first;
         found->second.next_ping = next_look_ = now_;
         server_by_id_.emplace(id, &found->second);
@@ -65,7 +64,12 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         for (LocalServer& local : local_servers_)
             if (local.is(hello.pid, hello.name)) local.joined = true;
         step_peer(found->second, PeerCause::welcomed, fmt::format("{} said HELLO.", hello.name));
+        if (misfit)
+            log_warning(fmt::format("Admitted the server {} because of --relaxed; what it renders marks the "
+                                    "image as not reproducible. {}",
+                                    hello.name, misfit->sentence));
     }
+    found->second.same_bits = !misfit;
     send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());
     servers_changed();
 }

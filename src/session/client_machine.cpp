@@ -51,6 +51,7 @@ Result<void> ClientMachine::resume(const CheckpointFile& file) {
     if (const auto taken = take_up(file, job_.state, work_, store_); !taken) return taken;
     saturated_ = file.history().saturated;
     dropped_ = file.history().dropped;
+    differing_rounds_ = file.history().differing_rounds;
     return {};
 }
 
@@ -101,6 +102,7 @@ void ClientMachine::change_state(RenderState state, std::shared_ptr<const Scene>
     const Epoch epoch{work_.epoch().value + 1};
     world_.cancel_all();
     work_.begin(job_.state.settings, epoch, now_);
+    differing_rounds_ = 0;
     servers_changed();
     Frames input = encode(message::Input{session_, epoch, ++sequence_, state_hash_, pack(changes)});
     store_.count_all({{Counter::messages_out, 1}, {Counter::bytes_out, size_of(input)}});

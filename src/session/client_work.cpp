@@ -223,6 +223,10 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
+    if (!server.same_bits) {
+        ++differing_rounds_;
+        store_.count(Counter::differing_rounds, 1, id);
+    }
     const bool may_be_drawn = store_.keeps_events() && is_plausible(started) && is_plausible(render_time);
     if (const auto offset = server.clock.at(now_); offset && may_be_drawn)
         store_.record({offset->to_client(started), 0, id, 0, SpanEvent{"render", render_time, lease}});

@@ -24,12 +24,14 @@ Json servers_json(const EventStore& store) {
                            {"name", server.name},
                            {"samples", server.total(Counter::samples)},
                            {"tiles", server.total(Counter::tiles)},
+                           {"differing_rounds", server.total(Counter::differing_rounds)},
                            {"rays", server.total(Counter::rays)},
                            {"bytes", server.total(Counter::bytes_in)},
                            {"rtt_ms_p50", rtt.p50_ms},
                            {"rtt_ms_p95", rtt.p95_ms},
                            {"tile_ms_p50", tile.p50_ms},
                            {"tile_ms_p95", tile.p95_ms},
+                           {"stuck", server.total(Counter::stuck)},
                            {"died", server.total(Counter::died) > 0}});
     }
     return servers;
@@ -92,6 +94,7 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"samples", total(Counter::samples)},
               {"samples_per_s", per_second(total(Counter::samples), figures.render_s)},
               {"image_hash", to_hex(figures.image_hash)},
+              {"reproducible", figures.reproducible},
               {"estimated_error", figures.estimated_error ? Json(*figures.estimated_error) : Json()},
               {"samples_per_pixel_min", figures.samples_per_pixel.min},
               {"samples_per_pixel_mean", figures.samples_per_pixel.mean},

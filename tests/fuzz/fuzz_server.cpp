@@ -31,7 +31,7 @@ const SceneCache& scene_cache() {
 class ServerScript : private ServerWorld {
   public:
     explicit ServerScript(std::string_view bytes)
-        : in_(bytes), machine_({"server", "0", build_identity(), 1, 7, "client"}, scene_cache(), *this) {}
+        : in_(bytes), machine_({"server", "0", {build_identity(), {}}, 1, 7, "client"}, scene_cache(), *this) {}
 
     void run() {
         machine_.on_linked(std::string(16, 'i'), now_);
@@ -71,6 +71,7 @@ class ServerScript : private ServerWorld {
               ticket);
     }
     void cancel_all() override {}
+    [[nodiscard]] std::uint64_t work_done() const override { return 0; }
     void load(RenderState state, Manifest) override {
         CHECK(!loading_.has_value());
         loading_ = std::move(state);

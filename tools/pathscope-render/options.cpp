@@ -102,6 +102,8 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
     app.add_option("--min-servers", client.min_servers, "begin when so many are ready (1 with --listen)")
         ->check(CLI::Range(0, 4096))
         ->type_name("N");
+    app.add_flag("--relaxed", client.relaxed,
+                 "admit servers whose bits may differ; the image is marked as not reproducible");
     add_ports(app, client.ports);
     add_lever(app, "--schedule", client.schedule, "who renders which block");
     add_lever(app, "--detector", client.detector, "when a silent server counts as dead");

@@ -25,13 +25,15 @@ enum class Counter {
     nonfinite_dropped,   ///< Samples whose radiance was not finite or negative.
     samples,             ///< Of pixels, merged; rounds_committed counts what they came in.
     tiles,               ///< Results of servers that were merged.
+    differing_rounds,    ///< Of them, those of servers whose bits may differ from the client's.
     rays,
     bytes_in,
     bytes_out,
     messages_in,
     messages_out,
     servers_joined,
-    died,  ///< 1 for a server that was declared dead; in total, how many.
+    stuck,  ///< How often a server answered heartbeats, but its work stood still.
+    died,   ///< 1 for a server that was declared dead; in total, how many.
 };
 
 inline constexpr std::array k_counter_names{
@@ -49,12 +51,14 @@ inline constexpr std::array k_counter_names{
     EnumName{Counter::nonfinite_dropped, "nonfinite_dropped"},
     EnumName{Counter::samples, "samples"},
     EnumName{Counter::tiles, "tiles"},
+    EnumName{Counter::differing_rounds, "differing_rounds"},
     EnumName{Counter::rays, "rays"},
     EnumName{Counter::bytes_in, "bytes_in"},
     EnumName{Counter::bytes_out, "bytes_out"},
     EnumName{Counter::messages_in, "messages_in"},
     EnumName{Counter::messages_out, "messages_out"},
     EnumName{Counter::servers_joined, "servers_joined"},
+    EnumName{Counter::stuck, "stuck"},
     EnumName{Counter::died, "died"},
 };
 constexpr const auto& enum_table(Counter) { return k_counter_names; }

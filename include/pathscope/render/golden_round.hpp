@@ -5,7 +5,7 @@
 ///
 /// Why: an image is the same bits whoever renders it only while all of them round alike. An instruction set with other
 /// rules, a compiler that fuses or reorders, a library with another root: each shows in the last bit of some path. So a
-/// server says this hash when it joins, and its client compares (session/bits.hpp).
+/// server says this hash when it joins, and its client compares (session/admission.hpp).
 /// It proves difference, never equality: a scene may do what the golden one does not. Hence it holds a little of all that
 /// there is: triangles with and without normals, spheres, every kind of material, textures, cut-outs, every kind of
 /// light, both kinds of sampler, every lever of light transport, direct and indirect light, both filters. Its sums are

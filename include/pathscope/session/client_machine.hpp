@@ -22,8 +22,10 @@
 #include "pathscope/cluster/clock_offset.hpp"
 #include "pathscope/cluster/lease_policy.hpp"
 #include "pathscope/cluster/peer.hpp"
+#include "pathscope/cluster/progress_watch.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/client_config.hpp"
 #include "pathscope/session/frame_work.hpp"
@@ -114,6 +116,8 @@ class ClientMachine {
     [[nodiscard]] const RenderState& state() const { return job_.state; }
     [[nodiscard]] Epoch epoch() const { return work_.epoch(); }
     [[nodiscard]] std::uint64_t saturated() const { return saturated_; }
+    /// Rounds of the frame that came from servers of other bits (admission.hpp). Above 0, the image is not reproducible.
+    [[nodiscard]] std::uint64_t differing_rounds() const { return differing_rounds_; }
     [[nodiscard]] const std::vector<DroppedSample>& dropped() const { return dropped_; }
 
   private:
@@ -123,14 +127,18 @@ class ClientMachine {
         std::uint32_t pid = 0;
         Peer peer;
         FailureDetector detector;
+        ProgressWatch progress;
         ClockEstimate clock{};
         Credits credits{0};
         SpeedEstimate speed{};
         Turnaround turnaround{};
         TimeNs next_ping = 0;
         bool asks = false;  ///< Is in asking_.
+        bool same_bits = true;
 
-        [[nodiscard]] bool stays() const { return peer.alive() && peer.state() != PeerState::draining; }
+        [[nodiscard]] bool stays() const {
+            return peer.alive() && peer.state() != PeerState::draining && peer.state() != PeerState::stuck;
+        }
     };
     /// A round of the client's own renderer: one part of it, or both.
     struct LocalWork {
@@ -161,8 +169,8 @@ class ClientMachine {
     void on(Server&, Other&) {}  // HELLO is handled before; the rest never decodes for a client.
 
     // client_joining.cpp: from HELLO to READY, and the way out.
-    [[nodiscard]] std::optional<std::string> reason_to_reject(const std::string& instance,
-                                                              const message::Hello& hello) const;
+    [[nodiscard]] bool admits(const std::string& instance, const message::Hello& hello,
+                              const std::optional<BitsMisfit>& misfit);
     void on_hello(const std::string& instance, const message::Hello& hello);
     void on(Server& server, message::SnapshotRequest& message);
     void on(Server& server, message::ManifestRequest& message);
@@ -177,6 +185,7 @@ class ClientMachine {
     // client_heartbeats.cpp: who lives.
     void on(Server& server, message::Ping& message);
     void on(Server& server, message::Pong& message);
+    void watch_progress(Server& server);
     bool ping(Server& server);
     void probe_connections();
     void watch_heartbeats();
@@ -233,6 +242,7 @@ class ClientMachine {
     std::uint64_t last_ticket_ = 0;
     std::map<std::uint64_t, LocalWork> local_work_;  ///< In the client's renderer, by ticket.
     std::uint64_t saturated_ = 0;
+    std::uint64_t differing_rounds_ = 0;
     std::vector<DroppedSample> dropped_;  ///< The first k_max_dropped_listed.
     bool stopped_ = false;
 };
