@@ -27,7 +27,7 @@ bool ClientMachine::admits(const std::string& instance, const message::Hello& he
     if (hello.instance != instance)
         reject = {RejectCode::malformed, "HELLO names another instance than its connection has.", 0};
     else if (misfit && !config_.relaxed)
-        reject = {misfit->code, misfit->sentence, 0};
+        reject = {misfit->code, fmt::format("{} {}", misfit->what, misfit->remedy), 0};
     if (!reject) return true;
     log_warning(fmt::format("Refused the server {}: {}", hello.name, reject->text));
     send(Channel::monitor, instance, std::move(*reject));
@@ -52,11 +52,11 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
             return;
         }
         const ServerId id{++last_server_};
-        found = servers_
-                    .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
-                                              FailureDetector(config_.detector, now_),
-                                              ProgressWatch(heartbeat_)})
-                    .first;
+        found =
+            servers_
+                .emplace(instance, Server{instance, hello.name, hello.pid, Peer(id, now_),
+                                          FailureDetector(config_.detector, now_), ProgressWatch(heartbeat_)})
+                .first;
         found->second.next_ping = next_look_ = now_;
         server_by_id_.emplace(id, &found->second);
         store_.name_server(id, hello.name);
@@ -65,9 +65,10 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
             if (local.is(hello.pid, hello.name)) local.joined = true;
         step_peer(found->second, PeerCause::welcomed, fmt::format("{} said HELLO.", hello.name));
         if (misfit)
-            log_warning(fmt::format("Admitted the server {} because of --relaxed; what it renders marks the "
-                                    "image as not reproducible. {}",
-                                    hello.name, misfit->sentence));
+            log_warning(
+                fmt::format("Admitted the server {} because of --relaxed; what it renders marks the "
+                            "image as not reproducible. {}",
+                            hello.name, misfit->what));
     }
     found->second.same_bits = !misfit;
     send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());

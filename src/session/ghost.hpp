@@ -45,7 +45,7 @@ class ModelledRenderer {
     double samples_per_second_;
     TimeNs free_at_ = 0;
     std::uint64_t finished_ = 0;  ///< Samples.
-    std::deque<Queued> queue_;  ///< By rising `done`.
+    std::deque<Queued> queue_;    ///< By rising `done`.
 };
 
 class GhostHost::Ghost : private ServerWorld {

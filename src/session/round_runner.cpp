@@ -80,9 +80,8 @@ void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, Round
         outcome.result = std::move(both->indirect);
         outcome.direct = std::move(both->direct);
     } else {
-        outcome.result =
-            render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_, &cancelled,
-                         &work_done_);
+        outcome.result = render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_,
+                                      &cancelled, &work_done_);
     }
     if (outcome.result && job.part == LightPart::indirect && job.settings.filter == FilterPlace::server)
         outcome.result->sums =

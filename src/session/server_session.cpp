@@ -28,7 +28,7 @@ std::string default_name() {
 ServerIdentity identity_of(const ServerConfig& config) {
     return {config.name,
             std::string(program_version()),
-            config.claimed_bits.value_or(own_bits()),
+            config.claimed_bits ? *config.claimed_bits : own_bits(),
             std::uint32_t(config.threads),
             std::uint32_t(::getpid()),
             config.host};

@@ -140,7 +140,8 @@ class ClientScript : private ClientWorld {
     void wait() { now_ += k_pauses[in_.below(k_pauses.size())]; }
     void hello() {
         const std::size_t peer = in_.below(k_peers);
-        say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, in_.byte(), own_bits().golden});
+        say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, in_.byte(),
+                                 own_bits().golden});
     }
     void ready() {
         say(in_.below(k_peers), message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});

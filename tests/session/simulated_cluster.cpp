@@ -217,7 +217,9 @@ std::string SimulatedCluster::run() {
         ++totals_.events;
         check_pace();
         check_all();
-        if (done() && end == k_longest_run)
+        if (!done())
+            end = k_longest_run;  // Again, if a new state came late: while the client did not run.
+        else if (end == k_longest_run)
             end = std::max(time_.now(), settings_.calm_at) +
                   (settings_.detector == DetectorKind::fixed ? k_slow_epilogue : k_epilogue);
     }

@@ -56,9 +56,9 @@ struct ClusterTotals {
     std::uint64_t lost = 0, doubled = 0, damaged = 0, parted = 0, unreachable = 0;
     std::uint64_t kills = 0, freezes = 0, partitions = 0, hangs = 0, drains = 0, joins = 0, pauses = 0,
                   restarts = 0, new_states = 0;
-    std::uint64_t stuck = 0;           ///< Servers seen to be so.
-    std::uint64_t refused_bits = 0;    ///< Servers of other bits that were turned away.
-    std::uint64_t marked_images = 0;   ///< For rounds of those that were admitted.
+    std::uint64_t stuck = 0;          ///< Servers seen to be so.
+    std::uint64_t refused_bits = 0;   ///< Servers of other bits that were turned away.
+    std::uint64_t marked_images = 0;  ///< For rounds of those that were admitted.
     std::uint64_t bad_messages = 0, deaths = 0;
     LedgerCounts ledger;
     TimeNs virtual_time = 0;

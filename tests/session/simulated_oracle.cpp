@@ -107,7 +107,10 @@ void SimulatedCluster::check_picture(LightPart part, const FrameSums& sums, std:
 void SimulatedCluster::check_end() {
     if (!done()) {
         if (!someone_can_work()) return;  // Nobody was left, and the client was told to wait for somebody.
-        return fail("the frame is not complete");
+        return fail(fmt::format("the frame is not complete: {} of {} rounds, {} leases are out",
+                                client_->machine().work().indirect_ledger().rounds_committed(),
+                                client_->machine().work().indirect_ledger().rounds(),
+                                client_->machine().work().indirect_ledger().outstanding()));
     }
     const ClientMachine& machine = client_->machine();
     check_picture(LightPart::indirect, machine.work().indirect(), machine.state().settings.spp);

@@ -47,10 +47,11 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
 std::string ClusterSettings::describe() const {
     return fmt::format(
         "{} servers, {}x{} in blocks of {}, {}+{} samples in rounds of {}, {}, {}, at least {}, lose {:.2f}, "
-        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, {:.2f} of other bits {}, calm at {:.1f} s",
+        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, {:.2f} of other bits {}, "
+        "calm at {:.1f} s",
         servers, width, height, block, spp, direct_spp, round_samples, name_of(schedule), name_of(detector),
-        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, differing, relaxed ? "admitted" : "refused",
-        to_seconds(calm_at));
+        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, differing,
+        relaxed ? "admitted" : "refused", to_seconds(calm_at));
 }
 
 void ClusterTotals::add(const ClusterTotals& other) {

@@ -279,7 +279,8 @@ TEST_CASE("garbage, foreign versions and unknown peers are dropped and counted, 
     tile.count = 2;
     tile.codec = "raw";
     send(frames, encode(tile));
-    Frames foreign = encode(message::Hello{std::string(16, 'x'), "n", "v", own_bits().build, 1, 0, own_bits().golden});
+    Frames foreign =
+        encode(message::Hello{std::string(16, 'x'), "n", "v", own_bits().build, 1, 0, own_bits().golden});
     foreign[0] = message_head(99, std::uint8_t(MessageType::hello), foreign[1]);
     send(monitor, foreign);
     std::optional<Frames> answer;
@@ -307,8 +308,8 @@ TEST_CASE("a server of another build is refused, and says why") {
     DealerSocket monitor = std::move(
         *DealerSocket::connect(context, "tcp://127.0.0.1:" + std::to_string(ports_of(*client)[1]), id));
     REQUIRE(step_until(*client, [&] {
-        return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0})) ==
-               SendOutcome::delivered;
+        return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0,
+                                                  own_bits().golden})) == SendOutcome::delivered;
     }));
     std::optional<Frames> answer;
     REQUIRE(step_until(*client, [&] { return (answer = monitor.receive()).has_value(); }));
@@ -373,7 +374,8 @@ TEST_CASE("a server of other bits is refused and told why; a relaxed client take
     CHECK(client->differing_rounds() == 0);  // Of the frame that begins anew.
 }
 
-TEST_CASE("a server whose renderer blocks answers heartbeats, is seen to be stuck, and the frame is finished") {
+TEST_CASE(
+    "a server whose renderer blocks answers heartbeats, is seen to be stuck, and the frame is finished") {
     const SmallJob small(16);
     const TemporaryFolder cache;
     std::atomic<int> rounds{0};

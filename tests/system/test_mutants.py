@@ -3,7 +3,8 @@
     test_mutants.py BUILD      BUILD: a configured build folder with test_session in it
 
 A mutant is one source file with a few words changed, compiled as the build compiles it and linked into test_session before
-the library that holds the sound one. Within 100 seeds (a few more where said) some world must break.
+the library that holds the sound one. Within 100 seeds (a few more where said) some world must break. And a compiler that
+rounds otherwise must show in the golden round.
 """
 import os
 import pathlib
@@ -22,10 +23,11 @@ PATIENCE_S = 600
 LEDGER = "src/cluster/ledger.cpp"
 SERVER = "src/session/server_machine.cpp"
 SERVER_STATE = "src/session/server_state.cpp"
+JOINING = "src/session/client_joining.cpp"
 
 
-def ninja_commands():
-    text = subprocess.run(["ninja", "-C", BUILD, "-t", "commands", "test_session"], check=True,
+def ninja_commands(program):
+    text = subprocess.run(["ninja", "-C", BUILD, "-t", "commands", program], check=True,
                           capture_output=True, text=True).stdout
     return text.splitlines()
 
@@ -39,8 +41,8 @@ def compile_command(commands, source, mutant, out):
     return [*words, f"-I{pathlib.Path(source).resolve().parent}"]
 
 
-def link_command(commands, extra, out):
-    line = next(line for line in reversed(commands) if " -o test_session " in line)
+def link_command(commands, extra, out, program="test_session"):
+    line = next(line for line in reversed(commands) if f" -o {program} " in line)
     words = shlex.split(re.sub(r"^: && | && :$", "", line))
     words[words.index("-o") + 1] = str(out)
     first_object = next(i for i, word in enumerate(words) if word.endswith(".o"))
@@ -63,7 +65,7 @@ def broken_worlds(program, seeds):
 class Mutants(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.commands = ninja_commands()
+        cls.commands = ninja_commands("test_session")
 
     def worlds_broken_by(self, source, *changes, seeds=SEEDS):
         text = pathlib.Path(source).read_text()
@@ -85,6 +87,22 @@ class Mutants(unittest.TestCase):
 
     def test_0_the_sound_program_breaks_none(self):
         self.assertEqual(broken_worlds(BUILD / "test_session", SEEDS), 0)
+
+    def golden_hash(self, program):
+        run = subprocess.run([program, "-tc=the golden round is the same*"], check=True, capture_output=True, text=True)
+        return re.search("golden hash: ([0-9a-f]{64})", run.stdout)[1]
+
+    def test_a_compiler_that_rounds_otherwise_has_another_golden_round(self):
+        commands = ninja_commands("test_render")
+        sound = self.golden_hash(BUILD / "test_render")
+        for source in ("src/shading/bsdf.cpp", "src/scene/light_sampling.cpp", "src/scene/texture.cpp"):
+            with tempfile.TemporaryDirectory() as folder, self.subTest(source):
+                compiled, program = pathlib.Path(folder) / "m.o", pathlib.Path(folder) / "t"
+                compile_otherwise = compile_command(commands, source, pathlib.Path(source).resolve(), compiled)
+                compile_otherwise[-1:-1] = ["-ffast-math", "-ffp-contract=fast", "-mfma"]
+                for command in (compile_otherwise, link_command(commands, compiled, program, "test_render")):
+                    subprocess.run(command, cwd=BUILD, check=True, capture_output=True, text=True)
+                self.assertNotEqual(self.golden_hash(program), sound)
 
     def test_ledger_counts_twice(self):
         """The round's records stay, so that a second result of it is accepted like the first."""
@@ -122,6 +140,17 @@ class Mutants(unittest.TestCase):
         self.check("src/protocol/decode.cpp",
                    ("    if (sealed && frames[0] != message_head(version, type, frames[1]))\n",
                     "    if (false)\n"), seeds=1500)
+
+    def test_a_server_of_other_bits_is_admitted(self):
+        self.check(JOINING, ("    else if (misfit && !config_.relaxed)\n", "    else if (misfit && config_.relaxed)\n"))
+
+    def test_a_round_of_other_bits_is_not_marked(self):
+        self.check(JOINING, ("    found->second.same_bits = !misfit;\n", ""), seeds=600)
+
+    def test_a_slow_server_is_called_stuck(self):
+        """As if the counter rose only with finished rounds."""
+        self.check("src/cluster/progress_watch.cpp",
+                   ("    if (counter > counter_ || leases == 0) {\n", "    if (leases == 0) {\n"), seeds=300)
 
     def test_a_server_says_ready_only_once(self):
         self.check(SERVER, ("    send_answer(message::Credit{session_, credits_, received_});\n    if (phase_ == Phase::work) send_ready();\n", ""))

@@ -136,8 +136,9 @@ void tell_how_to_join(const std::string& endpoint, const std::optional<ClientKey
 
 /// What is said of an image for which --relaxed made a difference.
 std::string differing_bits(std::uint64_t rounds, const FrameWork& work) {
-    return fmt::format("{} of {} rounds came from servers whose bits may differ from the client's (--relaxed).",
-                       rounds, work.indirect_ledger().rounds_committed());
+    return fmt::format(
+        "{} of {} rounds came from servers whose bits may differ from the client's (--relaxed).", rounds,
+        work.indirect_ledger().rounds_committed());
 }
 
 }  // namespace

@@ -28,15 +28,26 @@ namespace pathscope {
 enum class PeerState { fresh, syncing, ready, suspect, stuck, draining, dead, gone };
 
 inline constexpr std::array k_peer_state_names{
-    EnumName{PeerState::fresh, "NEW"},         EnumName{PeerState::syncing, "SYNCING"},
-    EnumName{PeerState::ready, "READY"},       EnumName{PeerState::suspect, "SUSPECT"},
-    EnumName{PeerState::stuck, "STUCK"},
-    EnumName{PeerState::draining, "DRAINING"}, EnumName{PeerState::dead, "DEAD"},
-    EnumName{PeerState::gone, "GONE"},
+    EnumName{PeerState::fresh, "NEW"},   EnumName{PeerState::syncing, "SYNCING"},
+    EnumName{PeerState::ready, "READY"}, EnumName{PeerState::suspect, "SUSPECT"},
+    EnumName{PeerState::stuck, "STUCK"}, EnumName{PeerState::draining, "DRAINING"},
+    EnumName{PeerState::dead, "DEAD"},   EnumName{PeerState::gone, "GONE"},
 };
 constexpr const auto& enum_table(PeerState) { return k_peer_state_names; }
 
-enum class PeerCause { welcomed, synced, state_lost, silent, heard, stuck, moved, drain, left, lost, removed };
+enum class PeerCause {
+    welcomed,
+    synced,
+    state_lost,
+    silent,
+    heard,
+    stuck,
+    moved,
+    drain,
+    left,
+    lost,
+    removed
+};
 
 inline constexpr std::array k_peer_cause_names{
     EnumName{PeerCause::welcomed, "welcomed"},

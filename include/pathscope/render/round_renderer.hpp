@@ -53,8 +53,7 @@ struct PartsResult {
 };
 [[nodiscard]] std::optional<PartsResult> render_both_parts(const Scene& scene, const Camera& camera,
                                                            const RenderSettings& settings, const Round& round,
-                                                           int threads,
-                                                           const CancelFlag* cancelled = nullptr,
+                                                           int threads, const CancelFlag* cancelled = nullptr,
                                                            WorkCounter* work_done = nullptr);
 
 }  // namespace pathscope

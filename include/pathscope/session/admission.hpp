@@ -29,7 +29,8 @@ struct BitsIdentity {
 /// Why a server's bits are not, or may not be, the client's.
 struct BitsMisfit {
     RejectCode code = RejectCode::bits;
-    std::string sentence;  ///< For the users of both sides: what differs, and what to do.
+    std::string what;    ///< For the users of both sides.
+    std::string remedy;  ///< What to do, if it is refused.
 };
 [[nodiscard]] std::optional<BitsMisfit> bits_misfit(const BitsIdentity& client, const BitsIdentity& server);
 
