@@ -19,21 +19,28 @@ const std::vector<PeerTransition> k_transitions{
     {S::suspect, C::state_lost, S::syncing, "it missed an input message, and asked for the complete state"},
     {S::ready, C::silent, S::suspect, "it has been silent for unusually long"},
     {S::suspect, C::heard, S::ready, "it was heard again"},
+    {S::ready, C::stuck, S::stuck, "it answers, but its work has stood still for too long"},
+    {S::suspect, C::stuck, S::stuck, "it answers, but its work has stood still for too long"},
+    {S::stuck, C::moved, S::ready, "its work goes on"},
+    {S::stuck, C::state_lost, S::syncing, "it missed an input message, and asked for the complete state"},
 
     {S::syncing, C::drain, S::draining, "it finishes what it has and leaves"},
     {S::ready, C::drain, S::draining, "it finishes what it has and leaves"},
     {S::suspect, C::drain, S::draining, "it finishes what it has and leaves"},
+    {S::stuck, C::drain, S::draining, "it finishes what it has and leaves"},
 
     {S::fresh, C::left, S::gone, "it said good-bye"},
     {S::syncing, C::left, S::gone, "it said good-bye"},
     {S::ready, C::left, S::gone, "it said good-bye"},
     {S::suspect, C::left, S::gone, "it said good-bye"},
+    {S::stuck, C::left, S::gone, "it said good-bye"},
     {S::draining, C::left, S::gone, "it said good-bye"},
 
     {S::fresh, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
     {S::syncing, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
     {S::ready, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
     {S::suspect, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
+    {S::stuck, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
     {S::draining, C::lost, S::dead, "its connection broke, or it has been silent for too long"},
 
     {S::dead, C::removed, S::gone, "its leases were given to others"},

@@ -53,6 +53,7 @@ void describe(Field& field, M& m) {
     field.text("build", m.build, 1, 64);
     field.u32("threads", m.threads, 1, 65536);
     field.u32("pid", m.pid, 0, k_max_u32);
+    field.hash("golden", m.golden);
 }
 
 template <class Field, Is<message::Welcome> M>

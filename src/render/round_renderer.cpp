@@ -36,10 +36,11 @@ class CameraPacket {
 
     /// Calls finish(sample, its ray and hit) for each; then the packet is empty.
     template <class Finish>
-    void trace(const Scene& scene, Finish finish) {
+    void trace(const Scene& scene, WorkCounter* work_done, Finish finish) {
         std::array<std::optional<SceneHit>, k_packet_rays> hits;
         intersect(scene, rays_, std::span(hits).first(rays_.size()));
         for (std::size_t i = 0; i < samples_.size(); ++i) finish(samples_[i], TracedRay{rays_[i], hits[i]});
+        if (work_done) work_done->fetch_add(samples_.size(), std::memory_order_relaxed);
         samples_.clear();
         rays_.clear();
     }
@@ -55,6 +56,7 @@ struct RowTask {
     const CameraFrame& camera;
     const RenderSettings& settings;
     const Round& round;
+    WorkCounter* work_done;
     int y;
 };
 
@@ -88,15 +90,15 @@ class RowSums {
 /// Calls finish(sample, its camera ray and hit) for each sample of the row.
 template <class Finish>
 void each_sample(const RowTask& task, Finish finish) {
-    const auto& [scene, camera, settings, round, y] = task;
+    const auto& [scene, camera, settings, round, work_done, y] = task;
     CameraPacket packet;
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t sample = round.first; sample < round.first + round.count; ++sample) {
             const PixelSampler sampler(settings.transport.sampler, settings.seed, x, y, sample);
             packet.add(x, sample, sampler, camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension)));
-            if (packet.full()) packet.trace(scene, finish);
+            if (packet.full()) packet.trace(scene, work_done, finish);
         }
-    packet.trace(scene, finish);
+    packet.trace(scene, work_done, finish);
 }
 
 template <LightPart part>
@@ -145,7 +147,8 @@ RoundResult empty_result(const Round& round) {
 /// rows[i] = render(row i), on `threads` threads; false if `cancelled` became true.
 template <class Row, class Render>
 bool render_rows(const Scene& scene, const Camera& camera, const RenderSettings& settings, const Round& round,
-                 int threads, const CancelFlag* cancelled, std::vector<Row>& rows, Render render) {
+                 int threads, const CancelFlag* cancelled, WorkCounter* work_done, std::vector<Row>& rows,
+                 Render render) {
     const PixelRect frame{0, 0, settings.width, settings.height};
     CHECK(frame.contains(round.rect), round.rect, settings.width, settings.height);
     const CameraFrame camera_frame = make_camera(camera, settings.width, settings.height);
@@ -154,7 +157,7 @@ bool render_rows(const Scene& scene, const Camera& camera, const RenderSettings&
     parallel_for(round.rect.height, threads, [&](int row) {
         if (!stopped())
             rows[std::size_t(row)] =
-                render(RowTask{scene, camera_frame, settings, round, round.rect.y + row});
+                render(RowTask{scene, camera_frame, settings, round, work_done, round.rect.y + row});
     });
     return !stopped();
 }
@@ -163,25 +166,27 @@ bool render_rows(const Scene& scene, const Camera& camera, const RenderSettings&
 
 std::optional<RoundResult> render_round(const Scene& scene, const Camera& camera,
                                         const RenderSettings& settings, LightPart part, const Round& round,
-                                        int threads, const CancelFlag* cancelled) {
+                                        int threads, const CancelFlag* cancelled, WorkCounter* work_done) {
     RoundResult result = empty_result(round);
     std::vector<RowResult> rows;
     const auto render = [&](const RowTask& task) {
         return part == LightPart::direct ? render_row<LightPart::direct>(task, result)
                                          : render_row<LightPart::indirect>(task, result);
     };
-    if (!render_rows(scene, camera, settings, round, threads, cancelled, rows, render)) return std::nullopt;
+    if (!render_rows(scene, camera, settings, round, threads, cancelled, work_done, rows, render))
+        return std::nullopt;
     for (const RowResult& row : rows) append(result, row);
     return result;
 }
 
 std::optional<PartsResult> render_both_parts(const Scene& scene, const Camera& camera,
                                              const RenderSettings& settings, const Round& round, int threads,
-                                             const CancelFlag* cancelled) {
+                                             const CancelFlag* cancelled, WorkCounter* work_done) {
     PartsResult result{empty_result(round), empty_result(round)};
     std::vector<PartsRow> rows;
     const auto render = [&](const RowTask& task) { return render_parts_row(task, result); };
-    if (!render_rows(scene, camera, settings, round, threads, cancelled, rows, render)) return std::nullopt;
+    if (!render_rows(scene, camera, settings, round, threads, cancelled, work_done, rows, render))
+        return std::nullopt;
     for (const PartsRow& row : rows) {
         append(result.direct, row.direct);
         append(result.indirect, row.indirect);

@@ -166,6 +166,7 @@ PackMap encode_header(const Checkpoint& checkpoint) {
     map.set("samples", history.samples);
     map.set("nonfinite_dropped", history.nonfinite_dropped);
     map.set("saturated", history.saturated);
+    map.set("differing_rounds", history.differing_rounds);
     map.set("dropped", encode_dropped(history.dropped));
     map.set("passes_finished", frame.passes_finished);
     map.set("last_pass_finished", frame.last_pass_finished);
@@ -195,6 +196,7 @@ WorkHistory decode_history(FieldReader& fields) {
     history.samples = fields.u64("samples");
     history.nonfinite_dropped = fields.u64("nonfinite_dropped");
     history.saturated = fields.u64("saturated");
+    history.differing_rounds = fields.u64("differing_rounds");
     history.dropped = decode_dropped(fields);
     return history;
 }
@@ -310,6 +312,7 @@ Result<void> take_up(const CheckpointFile& file, const RenderState& state, Frame
     store.count_earlier({{Counter::tiles, history.tiles},
                          {Counter::rays, history.rays},
                          {Counter::samples, history.samples},
+                         {Counter::differing_rounds, history.differing_rounds},
                          {Counter::nonfinite_dropped, history.nonfinite_dropped}});
     return {};
 }

@@ -33,7 +33,8 @@ void capture(const ClientSession& session, const EventStore& store, const WorkHi
                     total(Counter::samples),
                     total(Counter::nonfinite_dropped),
                     session.saturated(),
-                    session.dropped()};
+                    session.dropped(),
+                    session.differing_rounds()};
     session.work().snapshot(into.frame);
 }
 

@@ -21,7 +21,9 @@ void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, const 
              {claim.server, 1, result.samples, result.rays, result.dropped_count, result.saturated_count});
     if (part == LightPart::direct) return;
     const RoundKey round = work_.indirect_ledger().round_at(claim.unit, claim.first);
-    if (!audit_.chosen(round)) return;
+    const auto author = authors_.find(claim.server);
+    const bool may_differ = author != authors_.end() && !author->second.same_bits;  // Without a lie.
+    if (may_differ || !audit_.chosen(round)) return;
     if (audit_.on_merged({round, {claim.first, claim.count}, claim.server, hash_of_sums(sums)}))
         serve_all_ = true;  // Another server than this one may have nothing to do.
 }
@@ -153,11 +155,15 @@ std::uint64_t ClientMachine::take_back(const std::vector<Contribution>& gave, bo
     for (const Contribution& one : gave) {
         rounds += one.rounds;
         saturated_ -= one.saturated;
+        const auto author = authors_.find(one.server);
+        const bool differs = author != authors_.end() && !author->second.same_bits;
+        if (differs) differing_rounds_ -= one.rounds;
         store_.take_back({{Counter::tiles, one.rounds},
                           {Counter::rounds_committed, indirect ? one.rounds : 0},
                           {Counter::rays, one.rays},
                           {Counter::samples, one.samples},
-                          {Counter::nonfinite_dropped, one.nonfinite}},
+                          {Counter::nonfinite_dropped, one.nonfinite},
+                          {Counter::differing_rounds, differs ? one.rounds : 0}},
                          one.server);
     }
     return rounds;

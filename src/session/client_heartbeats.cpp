@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "pathscope/core/log.hpp"
+
 namespace pathscope {
 namespace {
 
@@ -27,9 +29,34 @@ void ClientMachine::on(Server& server, message::Ping& message) {
 void ClientMachine::on(Server& server, message::Pong& message) {
     server.detector.on_heartbeat(now_);
     const auto rtt = server.clock.add({TimeNs(message.token), message.received_ns, message.sent_ns, now_});
-    if (!rtt) return;
-    server.round_trip = server.clock.at(now_)->rtt;
-    store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
+    if (rtt) {
+        server.round_trip = server.clock.at(now_)->rtt;
+        store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
+    }
+    server.progress.on_heartbeat(message.progress, message.queue, now_);
+    watch_progress(server);
+}
+
+/// A stuck server keeps nothing, and is given nothing until its work goes on. It is not told: what it finishes late still
+/// counts if nobody was quicker.
+void ClientMachine::watch_progress(Server& server) {
+    const PeerState state = server.peer.state();
+    const bool stuck = server.progress.stuck(server.turnaround.mean());
+    if (stuck && (state == PeerState::ready || state == PeerState::suspect)) {
+        const ServerId id = server.peer.id();
+        const std::string why = fmt::format("It answers, but its work has stood still for {:.1f} s.",
+                                            to_seconds(server.progress.still()));
+        step_peer(server, PeerCause::stuck, why);
+        const std::size_t open = revoke(id);
+        store_.count(Counter::stuck, 1, id);
+        log_note(fmt::format("{} is stuck: {} {} round{} of it go{} to others.", server.name, why, open,
+                             open == 1 ? "" : "s", open == 1 ? "es" : ""));
+        servers_changed();
+    } else if (!stuck && state == PeerState::stuck) {
+        step_peer(server, PeerCause::moved, "Its work goes on.");
+        log_note(fmt::format("{} is no longer stuck.", server.name));
+        servers_changed();
+    }
 }
 
 bool ClientMachine::ping(Server& server) {

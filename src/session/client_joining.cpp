@@ -4,7 +4,6 @@
 
 #include "pathscope/cluster/credit_policy.hpp"
 #include "pathscope/core/log.hpp"
-#include "pathscope/session/build_identity.hpp"
 
 namespace pathscope {
 namespace {
@@ -21,27 +20,29 @@ TimeNs dead_after_of(DetectorKind kind) {
 
 }  // namespace
 
-std::optional<std::string> ClientMachine::reason_to_reject(const std::string& instance,
-                                                           const message::Hello& hello) const {
-    if (hello.instance != instance) return "HELLO names another instance than its connection has.";
-    if (depends_on_build(config_.strategy) && hello.build != build_identity())
-        return fmt::format(
-            "The client is '{}', this server is '{}': their pixels could differ in the last bit. Run "
-            "the same build on both machines.",
-            build_identity(), hello.build);
+/// For good, as it is.
+std::optional<message::Reject> ClientMachine::reason_to_reject(
+    const std::string& instance, const message::Hello& hello,
+    const std::optional<BitsMisfit>& misfit) const {
+    if (hello.instance != instance)
+        return message::Reject{RejectCode::malformed,
+                               "HELLO names another instance than its connection has.", 0};
+    if (misfit && !config_.relaxed)
+        return message::Reject{misfit->code, fmt::format("{} {}", misfit->what, misfit->remedy), 0};
     return std::nullopt;
 }
 
 void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender) {
     const std::string who = conduct_name(sender.key, hello.name, sender.address);
     if (const auto ban = conduct_.ban_of(who, now_)) return reject_banned(instance, *ban);
-    if (const auto reason = reason_to_reject(instance, hello)) {
-        log_warning(fmt::format("Refused the server {}: {}", hello.name, *reason));
-        send(Channel::monitor, instance,
-             message::Reject{hello.instance == instance ? RejectCode::build : RejectCode::malformed, *reason,
-                             0});
-        if (hello.instance != instance) offend(who, Offence::malformed);
-        return;
+    const std::optional<BitsMisfit> misfit = depends_on_build(config_.strategy)
+                                                 ? bits_misfit(own_bits(), {hello.build, hello.golden})
+                                                 : std::nullopt;
+    if (auto reject = reason_to_reject(instance, hello, misfit)) {
+        log_warning(fmt::format("Refused the server {}: {}", hello.name, reject->text));
+        const bool malformed = reject->code == RejectCode::malformed;
+        send(Channel::monitor, instance, std::move(*reject));
+        return malformed ? offend(who, Offence::malformed) : void();
     }
     auto found = servers_.find(instance);
     if (found != servers_.end()) {
@@ -49,6 +50,7 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         Server& server = found->second;
         revoke(server.peer.id());
         server.credits.clear();
+        server.progress = ProgressWatch(heartbeat_);
         step_peer(server, PeerCause::state_lost, "It said HELLO again.");
     } else {
         if (servers_.size() >= k_max_servers) {
@@ -59,18 +61,25 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
         const ServerId id{++last_server_};
         found = servers_
                     .emplace(instance, Server{instance, hello.name, who, hello.pid, Peer(id, now_),
-                                              FailureDetector(config_.detector, now_)})
+                                              FailureDetector(config_.detector, now_),
+                                              ProgressWatch(heartbeat_)})
                     .first;
         found->second.next_ping = next_look_ = now_;
         found->second.allowance = TokenBucket(config_.conduct.messages, now_);
         server_by_id_.emplace(id, &found->second);
-        if (audit_.enabled()) authors_.emplace(id, Author{hello.name, who});
+        if (audit_.enabled()) authors_.emplace(id, Author{hello.name, who, !misfit});
         store_.name_server(id, hello.name);
         store_.count(Counter::servers_joined, 1, id);
         for (LocalServer& local : local_servers_)
             if (local.is(hello.pid, hello.name)) local.joined = true;
         step_peer(found->second, PeerCause::welcomed, fmt::format("{} said HELLO.", hello.name));
+        if (misfit)
+            log_warning(
+                fmt::format("Admitted the server {} because of --relaxed; what it renders marks the "
+                            "image as not reproducible. {}",
+                            hello.name, misfit->what));
     }
+    found->second.same_bits = !misfit;
     send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());
     servers_changed();
 }

@@ -73,6 +73,7 @@ Result<void> ClientMachine::resume(const CheckpointFile& file) {
     if (const auto taken = take_up(file, job_.state, work_, store_); !taken) return taken;
     saturated_ = file.history().saturated;
     dropped_ = file.history().dropped;
+    differing_rounds_ = file.history().differing_rounds;
     return {};
 }
 
@@ -134,6 +135,7 @@ void ClientMachine::begin_epoch(const PackMap& changes, bool same_frame) {
     world_.cancel_all();
     same_frame ? work_.begin_anew(job_.state.settings, epoch, now_)
                : work_.begin(job_.state.settings, epoch, now_);
+    differing_rounds_ = 0;
     audit_.begin();
     gave_direct_.clear();
     gave_indirect_.clear();

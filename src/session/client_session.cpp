@@ -60,6 +60,7 @@ ClientSession::ClientSession(const ClientConfig& config, ClientJob job, EventSto
 ClientSession::~ClientSession() { machine_.say_goodbye(monotonic_now()); }
 
 Result<void> ClientSession::open_sockets() {
+    (void)own_bits();  // Rendered before there is a heartbeat to be late for.
     raise_descriptor_limit(k_wanted_descriptors);
     const auto endpoint = [&](std::size_t channel, bool any_port) {
         return any_port ? fmt::format("tcp://{}:*", config_.host)

@@ -120,8 +120,8 @@ bool ClientMachine::grant_to(Server& server) {
         return lease_duration(predicted, attempts);
     };
     std::optional<Lease> lease;
-    if (const auto item =
-            audit_.next_for(id))  // First: the sooner a liar is found, the less is to be undone.
+    // First: the sooner a liar is found, the less is to be undone.
+    if (const auto item = server.same_bits ? audit_.next_for(id) : std::nullopt)
         lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
     if (!lease) lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
@@ -271,6 +271,10 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
+    if (!server.same_bits) {
+        ++differing_rounds_;
+        store_.count(Counter::differing_rounds, 1, id);
+    }
     note_merged(LightPart::indirect, claim, result, arrived_);
     const bool may_be_drawn =
         store_.keeps_events() && is_plausible(tile.started_ns) && is_plausible(tile.render_ns);
@@ -324,9 +328,9 @@ void ClientMachine::release(LeaseId lease, ServerId server) {
     if (!audit_.release(lease, server)) work_.indirect_ledger().release(lease, server, now_);
 }
 
-void ClientMachine::revoke(ServerId server) {
-    work_.indirect_ledger().revoke(server, now_);
+std::size_t ClientMachine::revoke(ServerId server) {
     audit_.revoke(server);
+    return work_.indirect_ledger().revoke(server, now_).size();
 }
 
 Progress ClientMachine::progress() const {

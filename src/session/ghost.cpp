@@ -82,6 +82,15 @@ void ModelledRenderer::cancel_all() {
     for (Queued& queued : queue_) queued.cancelled = true;
 }
 
+std::uint64_t ModelledRenderer::work_done(TimeNs now) const {
+    if (queue_.empty()) return finished_;
+    // Only the first is in work, or several are done and not yet taken.
+    double samples = 0;
+    for (const Queued& queued : queue_)
+        samples += to_seconds(std::clamp(now, queued.started, queued.done) - queued.started);
+    return finished_ + std::uint64_t(samples * samples_per_second_);
+}
+
 std::optional<TimeNs> ModelledRenderer::next() const {
     const bool any_cancelled =
         std::any_of(queue_.begin(), queue_.end(), [](const Queued& queued) { return queued.cancelled; });
@@ -102,12 +111,14 @@ RoundOutcome ModelledRenderer::take(TimeNs now) {
         free_at_ -= saved;
         cancelled->done -= saved;
         const RoundOutcome outcome = outcome_of(*cancelled);
+        finished_ += outcome.round.samples();  // The counter must not fall.
         queue_.erase(cancelled);
         return outcome;
     }
     CHECK(!queue_.empty() && queue_.front().done <= now, queue_.size());
     RoundOutcome outcome = outcome_of(queue_.front());
     queue_.pop_front();
+    finished_ += outcome.round.samples();
     RoundResult result;  // Its light is made when it is packed.
     result.samples = result.rays = outcome.round.samples();
     outcome.result = std::move(result);
@@ -133,7 +144,7 @@ GhostHost::Ghost::Ghost(const Context& context, CrowdPoller& poller, const Ghost
       endpoints_{fmt::format("tcp://{}:{}", config.host, config.ports[1]),
                  fmt::format("tcp://{}:{}", config.host, config.ports[2])},
       key_(key),
-      machine_({fmt::format("{}-{}", config.name, number), program_version(), build_identity(), 1,
+      machine_({fmt::format("{}-{}", config.name, number), program_version(), own_bits(), 1,
                 std::uint32_t(::getpid()), config.host},
                SceneCache({}), *this),
       renderer_(samples_per_second) {}

@@ -24,6 +24,9 @@ class ModelledRenderer {
     void cancel(std::uint64_t ticket);
     void cancel_all();
 
+    /// Samples of all rounds, as far as they have come by then.
+    [[nodiscard]] std::uint64_t work_done(TimeNs now) const;
+
     /// When the next outcome is due.
     [[nodiscard]] std::optional<TimeNs> next() const;
     /// Requires: next() is at or before now.
@@ -41,7 +44,8 @@ class ModelledRenderer {
 
     double samples_per_second_;
     TimeNs free_at_ = 0;
-    std::deque<Queued> queue_;  ///< By rising `done`.
+    std::uint64_t finished_ = 0;  ///< Samples.
+    std::deque<Queued> queue_;    ///< By rising `done`.
 };
 
 class GhostHost::Ghost : private ServerWorld {
@@ -86,6 +90,7 @@ class GhostHost::Ghost : private ServerWorld {
     void begin(RoundJob job) override { renderer_.begin(job, monotonic_now()); }
     void cancel(std::uint64_t ticket) override { renderer_.cancel(ticket); }
     void cancel_all() override { renderer_.cancel_all(); }
+    [[nodiscard]] std::uint64_t work_done() const override { return renderer_.work_done(monotonic_now()); }
     void load(RenderState state, Manifest) override { to_load_ = std::move(state); }
     [[nodiscard]] bool reads_files() const override { return false; }
 

@@ -1,5 +1,6 @@
 #include "pathscope/session/round_runner.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -8,6 +9,11 @@
 #include "pathscope/render/tile_filter.hpp"
 
 namespace pathscope {
+namespace {
+
+constexpr TimeNs k_modelled_step = 100 * k_millisecond_ns;
+
+}  // namespace
 
 /// A flag that render loops read cheaply, and that wakes whoever waits for time to pass.
 class RoundRunner::Cancellation {
@@ -35,8 +41,12 @@ class RoundRunner::Cancellation {
     std::condition_variable changed_;
 };
 
-RoundRunner::RoundRunner(const WakePair& wake, int threads, double samples_per_second)
-    : threads_(threads), samples_per_second_(samples_per_second), finished_(wake) {}
+RoundRunner::RoundRunner(const WakePair& wake, int threads, double samples_per_second,
+                         std::function<void()> before_round)
+    : threads_(threads),
+      samples_per_second_(samples_per_second),
+      before_round_(std::move(before_round)),
+      finished_(wake) {}
 
 RoundRunner::~RoundRunner() { cancel_all(); }
 
@@ -61,7 +71,7 @@ std::vector<RoundOutcome> RoundRunner::take_finished() {
     return outcomes;
 }
 
-void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) const {
+void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) {
     CHECK(!job.direct_too || job.part == LightPart::indirect, job.ticket);
     if (job.strategy == Strategy::flat && job.part == LightPart::indirect) {
         RoundResult& result = outcome.result.emplace();
@@ -74,25 +84,35 @@ void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, Round
         return;
     }
     if (job.direct_too) {
-        auto both = render_both_parts(*job.scene, job.camera, job.settings, job.round, threads_, &cancelled);
+        auto both = render_both_parts(*job.scene, job.camera, job.settings, job.round, threads_, &cancelled,
+                                      &work_done_);
         if (!both) return;
         outcome.result = std::move(both->indirect);
         outcome.direct = std::move(both->direct);
     } else {
-        outcome.result =
-            render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_, &cancelled);
+        outcome.result = render_round(*job.scene, job.camera, job.settings, job.part, job.round, threads_,
+                                      &cancelled, &work_done_);
     }
     if (outcome.result && job.part == LightPart::indirect && job.settings.filter == FilterPlace::server)
         outcome.result->sums =
             filter_tile(*job.scene, job.camera, job.settings, job.round, outcome.result->sums, threads_);
 }
 
-RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) const {
+/// Of a slow machine that is modelled: it works all the while, and its counter says so.
+void RoundRunner::wait_until(TimeNs moment, Cancellation& cancellation) {
+    for (TimeNs now = monotonic_now(); now < moment && !cancellation.flag().load(); now = monotonic_now()) {
+        cancellation.wait_until(std::min(moment, now + k_modelled_step));
+        work_done_.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) {
     RoundOutcome outcome;
     outcome.ticket = job.ticket;
     outcome.part = job.part;
     outcome.round = job.round;
     outcome.started = monotonic_now();
+    if (before_round_) before_round_();
     try {
         render(job, cancellation.flag(), outcome);
     } catch (const std::exception& error) {
@@ -104,7 +124,7 @@ RoundOutcome RoundRunner::run(const RoundJob& job, Cancellation& cancellation) c
         const std::uint64_t samples =
             outcome.result->samples + (outcome.direct ? outcome.direct->samples : 0);
         const double seconds = double(samples) / samples_per_second_;
-        cancellation.wait_until(outcome.started + from_seconds(seconds));
+        wait_until(outcome.started + from_seconds(seconds), cancellation);
         if (cancellation.flag().load()) {
             outcome.result.reset();
             outcome.direct.reset();

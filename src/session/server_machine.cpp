@@ -72,8 +72,8 @@ void ServerMachine::on_timers(TimeNs now) {
     if (relink_reason_) return lose_link();
     if (phase_ == Phase::hello) {
         if (now_ < next_hello_) return;
-        send_monitor(message::Hello{instance_, identity_.name, identity_.version, identity_.build,
-                                    identity_.threads, identity_.pid});
+        send_monitor(message::Hello{instance_, identity_.name, identity_.version, identity_.bits.build,
+                                    identity_.threads, identity_.pid, identity_.bits.golden});
         next_hello_ = now_ + hello_pause_;
         hello_pause_ = std::min(2 * hello_pause_, k_longest_hello_pause);
         return;
@@ -90,7 +90,7 @@ void ServerMachine::on_timers(TimeNs now) {
 
 /// PING, and what an idle server said last: READY and CREDIT are absolute, and either may have been lost on its way.
 void ServerMachine::beat() {
-    send_monitor(message::Ping{std::uint64_t(now_), held_ ? held_->sequence : 0, samples_done_,
+    send_monitor(message::Ping{std::uint64_t(now_), held_ ? held_->sequence : 0, world_.work_done(),
                                std::uint32_t(leases_.size())});
     next_ping_ = now_ + heartbeat_;
     if (!leases_.empty() || !unsent_answers_.empty() || draining_) return;
@@ -139,7 +139,7 @@ void ServerMachine::on(message::Bye& message) {
 
 void ServerMachine::on(message::Ping& message) {
     if (held_ && message.sequence > held_->sequence && !missed_since_) missed_since_ = now_;
-    send_monitor(message::Pong{message.token, now_, now_, samples_done_, std::uint32_t(leases_.size())});
+    send_monitor(message::Pong{message.token, now_, now_, world_.work_done(), std::uint32_t(leases_.size())});
 }
 
 /// Whether it left. What is lost here is repeated by a timer: HELLO, requests, heartbeats.

@@ -28,7 +28,7 @@ std::string default_name() {
 ServerIdentity identity_of(const ServerConfig& config) {
     return {config.name,
             std::string(program_version()),
-            std::string(build_identity()),
+            config.claimed_bits ? *config.claimed_bits : own_bits(),
             std::uint32_t(config.threads),
             std::uint32_t(::getpid()),
             config.host};
@@ -50,7 +50,7 @@ ServerSession::ServerSession(ServerConfig config, WakePair wake)
       cache_(config_.cache_folder),
       machine_(identity_of(config_), cache_, *this),
       loaded_(wake_),
-      runner_(wake_, config_.threads, config_.samples_per_second) {}
+      runner_(wake_, config_.threads, config_.samples_per_second, config_.before_round) {}
 
 ServerSession::~ServerSession() = default;
 

@@ -71,7 +71,6 @@ void ServerMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
         return outcome.failure.empty() ? refuse(lease, draining_ ? NackCode::draining : NackCode::cancelled)
                                        : refuse(lease, NackCode::failed, outcome.failure);
     const RoundResult& result = *outcome.result;
-    samples_done_ += result.samples;
 
     message::Tile tile;
     tile.session = session_;

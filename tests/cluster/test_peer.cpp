@@ -60,8 +60,10 @@ TEST_CASE("every step that is not in the table is refused and counted, and chang
             Peer peer(ServerId{1}, 0);
             if (state != PeerState::fresh && state != PeerState::dead && state != PeerState::gone)
                 peer.apply(PeerCause::welcomed, 1);
-            if (state == PeerState::ready || state == PeerState::suspect) peer.apply(PeerCause::synced, 1);
+            if (state == PeerState::ready || state == PeerState::suspect || state == PeerState::stuck)
+                peer.apply(PeerCause::synced, 1);
             if (state == PeerState::suspect) peer.apply(PeerCause::silent, 1);
+            if (state == PeerState::stuck) peer.apply(PeerCause::stuck, 1);
             if (state == PeerState::draining) peer.apply(PeerCause::drain, 1);
             if (state == PeerState::dead) peer.apply(PeerCause::lost, 1);
             if (state == PeerState::gone) peer.apply(PeerCause::left, 1);

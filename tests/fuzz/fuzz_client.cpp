@@ -12,7 +12,7 @@
 #include "fuzz_target.hpp"
 #include "pathscope/core/check.hpp"
 #include "pathscope/protocol/block_result.hpp"
-#include "pathscope/session/build_identity.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/client_machine.hpp"
 #include "small_states.hpp"
 
@@ -140,7 +140,8 @@ class ClientScript : private ClientWorld {
     void wait() { now_ += k_pauses[in_.below(k_pauses.size())]; }
     void hello() {
         const std::size_t peer = in_.below(k_peers);
-        say(peer, message::Hello{instance_of(peer), "peer", "0", build_identity(), 1, in_.byte()});
+        say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, in_.byte(),
+                                 own_bits().golden});
     }
     void ready() {
         say(in_.below(k_peers), message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});
@@ -148,7 +149,7 @@ class ClientScript : private ClientWorld {
     /// What an honest server says: it holds the state and asks for work.
     void join() {
         const std::size_t peer = in_.below(k_peers);
-        say(peer, message::Hello{instance_of(peer), "peer", "0", build_identity(), 1, 1});
+        say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, 1, own_bits().golden});
         say(peer, message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});
     }
 

@@ -8,7 +8,6 @@
 #include "fuzz_target.hpp"
 #include "pathscope/core/check.hpp"
 #include "pathscope/protocol/block_result.hpp"
-#include "pathscope/session/build_identity.hpp"
 #include "pathscope/session/server_machine.hpp"
 #include "small_states.hpp"
 
@@ -31,7 +30,7 @@ const SceneCache& scene_cache() {
 class ServerScript : private ServerWorld {
   public:
     explicit ServerScript(std::string_view bytes)
-        : in_(bytes), machine_({"server", "0", build_identity(), 1, 7, "client"}, scene_cache(), *this) {}
+        : in_(bytes), machine_({"server", "0", own_bits(), 1, 7, "client"}, scene_cache(), *this) {}
 
     void run() {
         machine_.on_linked(std::string(16, 'i'), now_);
@@ -71,6 +70,7 @@ class ServerScript : private ServerWorld {
               ticket);
     }
     void cancel_all() override {}
+    [[nodiscard]] std::uint64_t work_done() const override { return 0; }
     void load(RenderState state, Manifest) override {
         CHECK(!loading_.has_value());
         loading_ = std::move(state);

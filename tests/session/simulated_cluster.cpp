@@ -71,7 +71,22 @@ void SimulatedCluster::count_client() {
 
 void SimulatedCluster::start_server() {
     const double speed = settings_.samples_per_second * std::exp2(6 * uniform() - 3);
-    servers_.push_back(std::make_unique<Server>(*this, std::uint32_t(servers_.size() + 1), speed));
+    const bool differs = settings_.differing > 0 && chance(settings_.differing);
+    servers_.push_back(std::make_unique<Server>(*this, std::uint32_t(servers_.size() + 1), speed, differs));
+}
+
+void SimulatedCluster::plan_hang(TimeNs at, TimeNs duration) {
+    time_.at(at, [this, duration] {
+        for (const auto& server : servers_) server->hang(time_.now() + duration);
+        ++totals_.hangs;
+    });
+}
+
+/// What happened to a client that is about to end.
+void SimulatedCluster::count_client() {
+    totals_.bad_messages += client_->store().total(Counter::bad_messages);
+    totals_.deaths += client_->store().total(Counter::died);
+    totals_.stuck += client_->store().total(Counter::stuck);
 }
 
 template <class Arrive>
@@ -186,19 +201,22 @@ void SimulatedCluster::strike() {
     if (!server.runs()) return;
     const double kind = uniform();
     const TimeNs until = std::min(time_.now() + soon(10), settings_.calm_at);
-    if (kind < 0.25) {
+    if (kind < 0.2) {
         ++totals_.kills;
         server.kill();
         // Its connections close, and that is told soon; unless the cable is cut as well.
         if (!server.parted())
             time_.at(time_.now() + soon(0.005),
                      [this] { client_->when_awake([this] { client_->connection_lost(); }); });
-    } else if (kind < 0.6) {
+    } else if (kind < 0.5) {
         ++totals_.freezes;
         server.freeze(until);
-    } else if (kind < 0.85) {
+    } else if (kind < 0.75) {
         ++totals_.partitions;
         server.part(until);
+    } else if (kind < 0.87) {
+        ++totals_.hangs;
+        server.hang(settings_.calm_at);
     } else {
         ++totals_.drains;
         server.when_awake([&server] { server.drain(); });

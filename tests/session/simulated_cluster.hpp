@@ -7,10 +7,11 @@
 ///   the ledger's audit holds: each round is counted at most once, no lease is lost (cluster/ledger.hpp);
 ///   each block's indirect light is that of its committed rounds, to the last bit;
 ///   while work is left and somebody could do it, rounds are committed;
-///   what waits at a server is bounded by its credits.
+///   what waits at a server is bounded by its credits;
+///   no server of other bits is admitted, unless the client is relaxed; none is called stuck unless some renderer hung.
 /// At the end, after a while without faults:
 ///   each pixel of both buffers is what the last state says, to the last bit: nothing lost, doubled or stale;
-///   every server holds the client's state and works on it.
+///   every server holds the client's state and works on it; those of other bits were refused, or marked the image.
 
 #include <cstdint>
 #include <map>
@@ -44,6 +45,8 @@ struct ClusterSettings {
     int incapable = 0;                 ///< Of the servers, the next: they cannot do their work, and say so.
     double audit = 0;                  ///< Share of rounds that are rendered twice.
     int new_states = 0;                ///< How often somebody drags the camera.
+    float differing = 0;               ///< The chance of a server to be one of other bits.
+    bool relaxed = false;              ///< The client admits those too.
     int restarts = 0;                  ///< How often the client dies and is started again, from nothing.
     TimeNs calm_at = 8 * k_second_ns;  ///< No fault of any kind from then on.
 
@@ -55,9 +58,12 @@ struct ClusterSettings {
 struct ClusterTotals {
     std::uint64_t events = 0, messages = 0;
     std::uint64_t lost = 0, doubled = 0, damaged = 0, parted = 0, unreachable = 0;
-    std::uint64_t kills = 0, freezes = 0, partitions = 0, drains = 0, joins = 0, pauses = 0, restarts = 0,
-                  new_states = 0;
-    std::uint64_t most_leases = 0;  ///< Of one server at once.
+    std::uint64_t kills = 0, freezes = 0, partitions = 0, hangs = 0, drains = 0, joins = 0, pauses = 0,
+                  restarts = 0, new_states = 0;
+    std::uint64_t stuck = 0;          ///< Servers seen to be so.
+    std::uint64_t refused_bits = 0;   ///< Servers of other bits that were turned away.
+    std::uint64_t marked_images = 0;  ///< For rounds of those that were admitted.
+    std::uint64_t most_leases = 0;    ///< Of one server at once.
     std::uint64_t bad_messages = 0, deaths = 0, bans = 0;
     std::uint64_t lies = 0, audited = 0, unmasked = 0, undone = 0, failures = 0;
     LedgerCounts ledger;
@@ -75,6 +81,9 @@ class SimulatedCluster {
     [[nodiscard]] std::string run();
 
     [[nodiscard]] const ClusterTotals& totals() const { return totals_; }
+
+    /// For worlds made by hand: at that moment the renderers of all servers hang, for that long.
+    void plan_hang(TimeNs at, TimeNs duration);
 
   private:
     class Client;
@@ -108,6 +117,9 @@ class SimulatedCluster {
     void check_pace();
     void check_progress();
     void check_end();
+    void check_marks();
+    void count_client();
+    [[nodiscard]] bool may_serve(const Server& server) const;
     void check_light();
     void check_accounts();
     void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);

@@ -25,12 +25,17 @@ bool SimulatedCluster::done() const {
     return client_->machine().complete() && settings_.new_states == 0 && settings_.restarts == 0;
 }
 
+bool SimulatedCluster::may_serve(const Server& server) const {
+    return settings_.relaxed || !server.differs();
+}
+
 bool SimulatedCluster::someone_can_work() const {
     if (client_->frozen()) return false;
     // A client that waits for servers works as soon as one is there; the others carry on alone.
     const bool waits = client_->machine().progress().waiting;
-    return !waits || std::any_of(servers_.begin(), servers_.end(), [](const auto& server) {
-        return server->runs() && !server->frozen() && !server->parted() && !server->draining();
+    return !waits || std::any_of(servers_.begin(), servers_.end(), [this](const auto& server) {
+        return server->runs() && !server->frozen() && !server->parted() && !server->draining() &&
+               may_serve(*server);
     });
 }
 
@@ -43,7 +48,10 @@ void SimulatedCluster::check_all() {
             server->machine().unsent_answers() > 2 * k_most_credits)
             fail(fmt::format("a server holds {} leases and {} unsent answers", server->machine().leases(),
                              server->machine().unsent_answers()));
+        if (server->machine().welcomed() && !may_serve(*server)) fail("a server of other bits was admitted");
     }
+    if (totals_.hangs == 0 && client_->store().total(Counter::stuck) > 0)
+        fail("an honest server is called stuck");
     check_progress();
 }
 
@@ -118,7 +126,10 @@ void SimulatedCluster::check_accounts() {
 void SimulatedCluster::check_end() {
     if (!done()) {
         if (!someone_can_work()) return;  // Nobody was left, and the client was told to wait for somebody.
-        return fail("the frame is not complete");
+        return fail(fmt::format("the frame is not complete: {} of {} rounds, {} leases are out",
+                                client_->machine().work().indirect_ledger().rounds_committed(),
+                                client_->machine().work().indirect_ledger().rounds(),
+                                client_->machine().work().indirect_ledger().outstanding()));
     }
     const ClientMachine& machine = client_->machine();
     if (honest_at_the_end())
@@ -129,6 +140,7 @@ void SimulatedCluster::check_end() {
     int alive = 0;
     for (const auto& server : servers_)
         if (server->runs() && !server->draining()) {
+            if (!may_serve(*server)) fail("a server of other bits goes on though it was refused");
             ++alive;
             if (server->machine().working_on() != wanted)
                 fail("a server does not hold the client's state at the end");
@@ -136,6 +148,23 @@ void SimulatedCluster::check_end() {
     if (machine.progress().servers_ready != alive)
         fail(fmt::format("{} servers are alive at the end, and the client would give work to {}", alive,
                          machine.progress().servers_ready));
+    check_marks();
+}
+
+/// The image is marked if, and only if, a round of a server of other bits is in it.
+void SimulatedCluster::check_marks() {
+    std::uint64_t tiles = 0;
+    for (const auto& server : servers_)
+        if (server->differs()) {
+            totals_.refused_bits += server->machine().refusal().has_value();
+            tiles += client_->tiles_of(server->name());
+        }
+    const std::uint64_t marked = client_->machine().differing_rounds();
+    totals_.marked_images += marked > 0;
+    if (!settings_.relaxed && tiles > 0) fail("a round of a server of other bits was taken");
+    const bool one_state = client_->machine().epoch() == Epoch{1};
+    if (marked > tiles || (one_state && marked != tiles))
+        fail(fmt::format("{} rounds are marked, and {} came from servers of other bits", marked, tiles));
 }
 
 }  // namespace pathscope::testing

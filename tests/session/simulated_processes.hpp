@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "pathscope/session/build_identity.hpp"
+#include "pathscope/session/admission.hpp"
 
 #include "simulated_cluster.hpp"
 
@@ -87,6 +87,13 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
 
     [[nodiscard]] const ClientMachine& machine() const { return machine_; }
     [[nodiscard]] const EventStore& store() const { return store_; }
+    /// Results that were merged, of the servers of that name.
+    [[nodiscard]] std::uint64_t tiles_of(std::string_view name) const {
+        std::uint64_t tiles = 0;
+        for (const ServerSummary& server : store_.servers())
+            if (server.name == name) tiles += server.total(Counter::tiles);
+        return tiles;
+    }
 
   private:
     static ClientConfig config(const ClusterSettings& settings) {
@@ -95,6 +102,7 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
         config.min_servers = settings.servers > 0 ? settings.min_servers : 0;
         config.schedule = settings.schedule;
         config.detector = settings.detector;
+        config.relaxed = settings.relaxed;
         config.block_size = settings.block;
         config.round_samples = settings.round_samples;
         config.audit = {settings.audit, settings.seed};
@@ -122,11 +130,13 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
 /// The same of a server.
 class SimulatedCluster::Server : public Process, private ServerWorld {
   public:
-    Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second)
+    Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second, bool differs)
         : Process(cluster.time_),
           cluster_(cluster),
           name_(fmt::format("server-{}", pid)),
-          machine_({name_, "0", std::string(build_identity()), 1, pid, "client"}, SceneCache({}), *this),
+          differs_(differs),
+          machine_({name_, "0", differs ? bits_of_another() : own_bits(), 1, pid, "client"}, SceneCache({}),
+                   *this),
           is_liar_(int(pid) <= cluster.settings_.liars),
           is_incapable_(!is_liar_ && int(pid) <= cluster.settings_.liars + cluster.settings_.incapable),
           renderer_(cluster.time_, samples_per_second, [this](RoundOutcome& outcome) {
@@ -150,6 +160,9 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
     [[nodiscard]] TimeNs parted_until() const { return parted_until_; }
     [[nodiscard]] bool parted() const { return time_.now() < parted_until_; }
     [[nodiscard]] bool draining() const { return draining_; }
+    [[nodiscard]] bool differs() const { return differs_; }
+    [[nodiscard]] const std::string& name() const { return name_; }
+    void hang(TimeNs until) { renderer_.hang(until); }
     [[nodiscard]] bool reachable_as(const std::string& instance) const {
         return runs() && instance == instance_ && machine_.linked();
     }
@@ -189,7 +202,13 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         cluster_.to_client(*this, channel, std::move(frames));
         return true;
     }
+    [[nodiscard]] static BitsIdentity bits_of_another() {
+        BitsIdentity bits = own_bits();
+        ++bits.golden[0];
+        return bits;
+    }
     void begin(RoundJob job) override { renderer_.begin(std::move(job)); }
+    [[nodiscard]] std::uint64_t work_done() const override { return renderer_.work_done(); }
     void cancel(std::uint64_t ticket) override { renderer_.cancel(ticket); }
     void cancel_all() override { renderer_.cancel_all(); }
     void load(RenderState state, Manifest) override {
@@ -211,7 +230,9 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
     [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
 
     SimulatedCluster& cluster_;
-    std::string instance_, name_;
+    std::string name_;
+    bool differs_;
+    std::string instance_;
     bool draining_ = false;
     TimeNs parted_until_ = 0;
     ServerMachine machine_;

@@ -51,6 +51,21 @@ class SimulatedRenderer {
         if (queue_.size() == 1) run_first();
     }
     void cancel(std::uint64_t ticket) { cancelled_.insert(ticket); }
+    /// Until then nothing is finished, and cancelling does not help.
+    void hang(TimeNs until) {
+        done_when_hung_ = work_done();
+        hangs_until_ = std::max(hangs_until_, until);
+    }
+    [[nodiscard]] bool hangs() const { return time_.now() < hangs_until_; }
+
+    /// Samples so far; stands still while it hangs.
+    [[nodiscard]] std::uint64_t work_done() const {
+        if (hangs()) return done_when_hung_;
+        if (queue_.empty()) return finished_;
+        const TimeNs worked = std::min(time_.now(), finish_at_) - begun_;
+        return finished_ + std::uint64_t(to_seconds(worked) * samples_per_second_);
+    }
+
     void cancel_all() {
         for (const RoundJob& job : queue_) cancel(job.ticket);
     }
@@ -62,11 +77,15 @@ class SimulatedRenderer {
         const double samples = double(job.round.samples()) * (job.direct_too ? 2 : 1);
         const TimeNs took =
             cancelled_.contains(job.ticket) ? k_millisecond_ns : from_seconds(samples / samples_per_second_);
-        time_.at(begun + took, [this, begun, took] { finish_first(begun, took); });
+        begun_ = begun;
+        finish_at_ = begun + took;
+        time_.at(finish_at_, [this, begun, took] { finish_first(begun, took); });
     }
     void finish_first(TimeNs begun, TimeNs took) {
+        if (hangs()) return time_.at(hangs_until_, [this, begun, took] { finish_first(begun, took); });
         const RoundJob job = std::move(queue_.front());
         queue_.pop_front();
+        finished_ += job.round.samples() + 1;
         RoundOutcome outcome;
         outcome.ticket = job.ticket;
         outcome.part = job.part;
@@ -84,6 +103,10 @@ class SimulatedRenderer {
     VirtualTime& time_;
     double samples_per_second_;
     Finish finish_;
+    std::uint64_t finished_ = 0;  ///< In samples, and one for each round.
+    TimeNs begun_ = 0, finish_at_ = 0;
+    TimeNs hangs_until_ = 0;
+    std::uint64_t done_when_hung_ = 0;
     std::deque<RoundJob> queue_;  ///< The first is being rendered.
     std::set<std::uint64_t> cancelled_;
 };

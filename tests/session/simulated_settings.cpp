@@ -33,6 +33,8 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
     s.new_states = int(below(3));
     s.restarts = often(5) ? 1 : 0;
     s.calm_at = from_seconds(2 + 8 * rng.next_float());
+    s.differing = often(6) ? 0.5f * rng.next_float() : 0;
+    s.relaxed = often(2);
     if (s.servers >= 100) {  // A crowd: what matters is that it is one.
         s.detector = DetectorKind::adaptive;
         s.faults_per_second *= 5;
@@ -52,12 +54,11 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
 std::string ClusterSettings::describe() const {
     return fmt::format(
         "{} servers, {}x{} in blocks of {}, {}+{} samples in rounds of {}, {}, {}, at least {}, lose {:.2f}, "
-        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, calm at {:.1f} s, {} "
-        "liars of {:.2f}, {} incapable, {:.1f} "
-        "audited",
+        "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, {:.2f} of other bits {}, "
+        "calm at {:.1f} s, {} liars of {:.2f}, {} incapable, {:.1f} audited",
         servers, width, height, block, spp, direct_spp, round_samples, name_of(schedule), name_of(detector),
-        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, to_seconds(calm_at),
-        liars, lie, incapable, audit);
+        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, differing,
+        relaxed ? "admitted" : "refused", to_seconds(calm_at), liars, lie, incapable, audit);
 }
 
 void ClusterTotals::add(const ClusterTotals& other) {
@@ -71,6 +72,10 @@ void ClusterTotals::add(const ClusterTotals& other) {
     kills += other.kills;
     freezes += other.freezes;
     partitions += other.partitions;
+    hangs += other.hangs;
+    stuck += other.stuck;
+    refused_bits += other.refused_bits;
+    marked_images += other.marked_images;
     drains += other.drains;
     joins += other.joins;
     pauses += other.pauses;

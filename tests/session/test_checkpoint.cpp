@@ -128,7 +128,7 @@ TEST_CASE("a frame that was stopped in the middle of a pass goes on with it") {
 
 TEST_CASE("header and history come back") {
     Checkpoint checkpoint = some_checkpoint({true, 0.02});
-    checkpoint.history = {3, 12.5, 4, 5, 6, 7, 8, 9, {{1, 2, 3}, {4, 5, 6}}};
+    checkpoint.history = {3, 12.5, 4, 5, 6, 7, 8, 9, {{1, 2, 3}, {4, 5, 6}}, 2};
     const auto file = CheckpointFile::parse(encode_checkpoint(checkpoint), "f.ck");
     REQUIRE(bool(file));
     const WorkHistory& history = file->history();
@@ -140,6 +140,7 @@ TEST_CASE("header and history come back") {
     CHECK(history.samples == 7);
     CHECK(history.nonfinite_dropped == 8);
     CHECK(history.saturated == 9);
+    CHECK(history.differing_rounds == 2);
     CHECK(history.dropped == std::vector<DroppedSample>{{1, 2, 3}, {4, 5, 6}});
     CHECK(!difference(file->work(), checkpoint.work));
 }

@@ -2,6 +2,7 @@
 /// the render of one machine.
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <thread>
 
@@ -9,7 +10,7 @@
 #include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
 #include "pathscope/render/rendered_frame.hpp"
-#include "pathscope/session/build_identity.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/client_session.hpp"
 #include "pathscope/session/server_session.hpp"
 
@@ -71,9 +72,8 @@ std::array<int, 3> ports_of(const ClientSession& client) {
 /// A server on a thread of its own; it is told to stop at the end of the scope.
 class RunningServer {
   public:
-    RunningServer(std::array<int, 3> ports, const std::filesystem::path& cache,
-                  double samples_per_second = 0) {
-        ServerConfig config;
+    RunningServer(std::array<int, 3> ports, const std::filesystem::path& cache, double samples_per_second = 0,
+                  ServerConfig config = {}) {
         config.ports = ports;
         config.name = "test";
         config.threads = 1;
@@ -325,7 +325,8 @@ TEST_CASE("garbage, foreign versions and unknown peers are dropped and counted, 
     tile.count = 2;
     tile.codec = "raw";
     send(frames, encode(tile));
-    Frames foreign = encode(message::Hello{std::string(16, 'x'), "n", "v", build_identity(), 1, 0});
+    Frames foreign =
+        encode(message::Hello{std::string(16, 'x'), "n", "v", own_bits().build, 1, 0, own_bits().golden});
     foreign[0] = message_head(99, std::uint8_t(MessageType::hello), foreign[1]);
     send(monitor, foreign);
     std::optional<Frames> answer;
@@ -353,8 +354,8 @@ TEST_CASE("a server of another build is refused, and says why") {
     DealerSocket monitor = std::move(
         *DealerSocket::connect(context, "tcp://127.0.0.1:" + std::to_string(ports_of(*client)[1]), id));
     REQUIRE(step_until(*client, [&] {
-        return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0})) ==
-               SendOutcome::delivered;
+        return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0,
+                                                  own_bits().golden})) == SendOutcome::delivered;
     }));
     std::optional<Frames> answer;
     REQUIRE(step_until(*client, [&] { return (answer = monitor.receive()).has_value(); }));
@@ -375,4 +376,75 @@ TEST_CASE("a port in use is a sentence that names it") {
     const auto second = ClientSession::create(config, small.job(), store);
     REQUIRE_FALSE(bool(second));
     CHECK(second.error().message.find(std::to_string(config.ports[0])) != std::string::npos);
+}
+
+TEST_CASE("a server of other bits is refused and told why; a relaxed client takes it, and marks the image") {
+    const SmallJob small;
+    const TemporaryFolder cache;
+    ServerConfig foreign;
+    foreign.claimed_bits = own_bits();
+    ++foreign.claimed_bits->golden[0];
+    {
+        EventStore store;
+        const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+        RunningServer server(ports_of(*client), cache.path(), 0, foreign);
+        std::atomic<bool> ended{false};
+        Result<void> result;
+        std::thread waiting([&] {
+            result = server.wait();
+            ended.store(true);
+        });
+        CHECK(step_until(*client, [&] { return ended.load(); }));
+        waiting.join();
+        REQUIRE(!result);
+        CHECK(result.error().message.find("golden round has the bits") != std::string::npos);
+        CHECK(store.total(Counter::servers_joined) == 0);
+        // One of the right bits is welcome all the same.
+        const RunningServer good(ports_of(*client), cache.path());
+        REQUIRE(finish(*client));
+        CHECK(client->differing_rounds() == 0);
+    }
+    EventStore store;
+    ClientConfig config = listening(1);
+    config.relaxed = true;
+    const auto client = std::move(*ClientSession::create(config, small.job(), store));
+    const RunningServer server(ports_of(*client), cache.path(), 0, foreign);
+    REQUIRE(finish(*client));
+    CHECK(hash_of(*client) == small.hash_of_one_machine());  // It only says that its bits differ.
+    CHECK(client->differing_rounds() > 0);
+    CHECK(client->differing_rounds() == store.total(Counter::differing_rounds));
+    CHECK(client->differing_rounds() == store.server(ServerId{1})->total(Counter::tiles));
+    RenderState again = small.state;
+    again.settings.seed = 8;
+    client->change_state(again);
+    CHECK(client->differing_rounds() == 0);  // Of the frame that begins anew.
+}
+
+TEST_CASE(
+    "a server whose renderer blocks answers heartbeats, is seen to be stuck, and the frame is finished") {
+    const SmallJob small(16);
+    const TemporaryFolder cache;
+    std::atomic<int> rounds{0};
+    std::atomic<bool> blocks{true};
+    ServerConfig config;
+    config.before_round = [&] {
+        if (rounds.fetch_add(1) < 3) return;
+        while (blocks.load()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    };
+    EventStore store;
+    const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
+    {
+        const RunningServer server(ports_of(*client), cache.path(), 0, config);
+        const TimeNs begun = monotonic_now();
+        CHECK(finish(*client));  // By the client alone.
+        CHECK(monotonic_now() - begun > ProgressWatch::k_least_patience);
+        CHECK(store.total(Counter::stuck) >= 1);
+        CHECK(store.total(Counter::died) == 0);
+        CHECK(client->progress().servers_ready == 0);
+        blocks.store(false);
+        CHECK(step_until(*client, [&] { return client->progress().servers_ready == 1; }));
+    }
+    CHECK(hash_of(*client) == small.hash_of_one_machine());
+    CHECK(store.server(k_local_server)->total(Counter::rounds_committed) > 0);
+    CHECK(bool(client->work().indirect_ledger().audit()));
 }

@@ -1,5 +1,8 @@
 #include "pathscope/session/round_runner.hpp"
 
+#include <chrono>
+#include <thread>
+
 #include "integrator/estimator_scenes.hpp"
 #include "pathscope/net/poller.hpp"
 
@@ -121,4 +124,20 @@ TEST_CASE("a cancelled round that waits has an empty outcome, and cancelling end
         CHECK(run.runner.pending() == 0);
     }
     // The runner's end does not wait for seven hours either.
+}
+
+TEST_CASE("the counter of work rises by every sample, and goes on while a slow machine is modelled") {
+    SmallRun fast;
+    fast.runner.begin(fast.job(1));
+    const std::uint64_t samples = fast.take(1)[0].result->samples;
+    CHECK(fast.runner.work_done() == samples);
+
+    SmallRun slow(double(samples) / 1.5);  // A round takes a second and a half.
+    slow.runner.begin(slow.job(1));
+    const TimeNs limit = monotonic_now() + k_patience;
+    while (slow.runner.work_done() < samples + 2 && monotonic_now() < limit)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    CHECK(slow.runner.take_finished().empty());  // It rose within the round.
+    CHECK(slow.take(1)[0].result->samples == samples);
+    CHECK(slow.runner.work_done() > samples + 2);
 }

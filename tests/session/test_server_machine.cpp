@@ -20,6 +20,7 @@ class StoppableWorld : public ServerWorld {
     void begin(RoundJob job) override { begun.push_back(std::move(job)); }
     void cancel(std::uint64_t) override {}
     void cancel_all() override {}
+    [[nodiscard]] std::uint64_t work_done() const override { return 0; }
     void load(RenderState state, Manifest) override { wanted = std::move(state); }
 
     bool stopped = false;
@@ -45,7 +46,7 @@ TEST_CASE("a client that grants without end and takes no answer does not fill th
     constexpr std::uint32_t k_credits = 2;
     const TemporaryFolder folder;
     StoppableWorld world;
-    ServerMachine server({"server", "0", "build", 1, 7, "client"}, SceneCache(folder.path()), world);
+    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
     TimeNs now = k_second_ns;
     const auto say = [&](Message message) {
         const Channel channel = k_message_table[message.index()].channel;

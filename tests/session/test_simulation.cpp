@@ -70,27 +70,66 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
         "{} worlds, {} events, {} messages, {:.0f} s of virtual time; messages: {} lost, {} "
         "doubled, {} damaged, {} "
         "parted, {} unreachable, {} refused; processes: {} killed, {} frozen, {} parted, {} "
-        "drained, {} joined, {} "
-        "pauses and {} restarts of the client, {} new states, {} given up, {} banned, {} failures; {} lies, "
+        "hung ({} seen stuck), {} drained, {} joined, {} "
+        "pauses and {} restarts of the client, {} new states, {} given up, {} banned, {} failures; {} of "
+        "other bits refused, {} images marked; {} lies, "
         "{} rounds audited, {} unmasked, {} undone; leases: {} granted, "
         "{} expired, {} "
         "revoked, {} released, {} superseded, {} dropped, {} copied, {} reallocated; results: {} "
         "accepted ({} late), "
         "{} duplicate, {} stale, {} unknown",
         count, all.events, all.messages, to_seconds(all.virtual_time), all.lost, all.doubled, all.damaged,
-        all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.drains,
-        all.joins, all.pauses, all.restarts, all.new_states, all.deaths, all.bans, all.failures, all.lies,
-        all.audited, all.unmasked, all.undone, c.granted, c.expired, c.revoked, c.released, c.superseded,
+        all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.hangs,
+        all.stuck, all.drains, all.joins, all.pauses, all.restarts, all.new_states, all.deaths, all.bans,
+        all.failures, all.refused_bits, all.marked_images, all.lies, all.audited, all.unmasked, all.undone,
+        c.granted, c.expired, c.revoked, c.released, c.superseded,
         c.dropped, c.copied, c.reallocated, c.accepted, c.late, c.duplicates, c.stale, c.unknown));
     if (count < 2000) return;
     CHECK(all.most_leases > 2 * k_least_credits);  // Wires are slow at times, and rounds are short.
     // The simulation is worth its name only if everything does happen in it.
     for (const std::uint64_t happened :
-         {all.lost,     all.doubled,    all.damaged,    all.parted,    all.unreachable, all.bad_messages,
-          all.kills,    all.freezes,    all.partitions, all.drains,    all.joins,       all.pauses,
-          all.restarts, all.new_states, all.deaths,     all.bans,      all.failures,    all.lies,
-          all.audited,  all.unmasked,   all.undone,     c.expired,     c.revoked,       c.released,
-          c.superseded, c.dropped,      c.copied,       c.reallocated, c.late,          c.duplicates,
-          c.stale,      c.unknown})
+         {all.hangs,      all.stuck,     all.refused_bits, all.marked_images, all.lost,     all.doubled,
+          all.damaged,    all.parted,    all.unreachable,  all.bad_messages,  all.kills,    all.freezes,
+          all.partitions, all.drains,    all.joins,        all.pauses,        all.restarts, all.new_states,
+          all.deaths,     all.bans,      all.failures,     all.lies,          all.audited,  all.unmasked,
+          all.undone,     c.expired,     c.revoked,        c.released,        c.superseded, c.dropped,
+          c.copied,       c.reallocated, c.late,           c.duplicates,      c.stale,      c.unknown})
         CHECK(happened >= 5);
+}
+
+TEST_CASE("a server that answers and gets nowhere is seen, and its work is done without it") {
+    const Silence silence;
+    ClusterSettings settings;
+    settings.seed = 1;
+    settings.servers = 1;
+    settings.spp = 100;
+    settings.calm_at = 0;
+    SimulatedCluster alone(settings);  // By the client, which believes that it has a server.
+    alone.plan_hang(k_second_ns, 1000 * k_second_ns);
+    CHECK(alone.run().find("would give work to 0") != std::string::npos);  // It hangs to the end.
+    CHECK(alone.totals().stuck == 1);
+    CHECK(alone.totals().ledger.revoked > 0);
+    CHECK(alone.totals().virtual_time < 60 * k_second_ns);
+
+    settings.spp = 5000;
+    SimulatedCluster again(settings);  // By both, when it comes to again.
+    again.plan_hang(k_second_ns, 12 * k_second_ns);
+    CHECK(again.run() == "");
+    CHECK(again.totals().stuck == 1);
+}
+
+TEST_CASE("an honest server is not called stuck, however slow it is") {
+    const Silence silence;
+    for (const DetectorKind detector : {DetectorKind::adaptive, DetectorKind::fixed}) {
+        ClusterSettings settings;
+        settings.seed = 3;
+        settings.servers = 3;
+        settings.min_servers = 1;
+        settings.detector = detector;
+        settings.samples_per_second = 8;  // A round may take half a minute.
+        settings.calm_at = 0;
+        SimulatedCluster cluster(settings);
+        CHECK(cluster.run() == "");
+        CHECK(cluster.totals().stuck == 0);
+    }
 }

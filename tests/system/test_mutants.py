@@ -1,10 +1,11 @@
 """The simulation must be able to fail: bugs are put in on purpose, one at a time, and each must break a world. So must the tests
 of the classic system's defects, S1 to S13 of docs/testing.md: where a few words bring the defect back, its test must fail.
 
-    test_mutants.py BUILD      BUILD: a configured build folder with test_session and test_protocol in it
+    test_mutants.py BUILD      BUILD: a configured build folder with test_session, test_protocol and test_render in it
 
 A mutant is one source file with a few words changed, compiled as the build compiles it and linked into the test before
-the library that holds the sound one. Within 100 seeds (a few more where said) some world must break.
+the library that holds the sound one. Within 100 seeds (a few more where said) some world must break. And a compiler that
+rounds otherwise must show in the golden round.
 """
 import os
 import pathlib
@@ -24,6 +25,7 @@ LEDGER = "src/cluster/ledger.cpp"
 CLIENT = "src/session/client_machine.cpp"
 SERVER = "src/session/server_machine.cpp"
 SERVER_STATE = "src/session/server_state.cpp"
+JOINING = "src/session/client_joining.cpp"
 
 
 def ninja_commands(target):
@@ -76,7 +78,7 @@ def broken_worlds(program, seeds, variables):
 class Mutants(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.commands = {target: ninja_commands(target) for target in ("test_session", "test_protocol")}
+        cls.commands = {target: ninja_commands(target) for target in ("test_session", "test_protocol", "test_render")}
 
     def verdict_on(self, source, changes, judge, target="test_session"):
         """What `judge` says of the program with the changes."""
@@ -99,6 +101,22 @@ class Mutants(unittest.TestCase):
 
     def test_0_the_sound_program_breaks_none(self):
         self.assertEqual(broken_worlds(BUILD / "test_session", SEEDS, {}), 0)
+
+    def golden_hash(self, program):
+        run = subprocess.run([program, "-tc=the golden round is the same*"], check=True, capture_output=True, text=True)
+        return re.search("golden hash: ([0-9a-f]{64})", run.stdout)[1]
+
+    def test_a_compiler_that_rounds_otherwise_has_another_golden_round(self):
+        commands = self.commands["test_render"]
+        sound = self.golden_hash(BUILD / "test_render")
+        for source in ("src/shading/bsdf.cpp", "src/scene/light_sampling.cpp", "src/scene/texture.cpp"):
+            with tempfile.TemporaryDirectory() as folder, self.subTest(source):
+                compiled, program = pathlib.Path(folder) / "m.o", pathlib.Path(folder) / "t"
+                compile_otherwise = compile_command(commands, source, pathlib.Path(source).resolve(), compiled)
+                compile_otherwise[-1:-1] = ["-ffast-math", "-ffp-contract=fast", "-mfma"]
+                for command in (compile_otherwise, link_command(commands, "test_render", compiled, program)):
+                    subprocess.run(command, cwd=BUILD, check=True, capture_output=True, text=True)
+                self.assertNotEqual(self.golden_hash(program), sound)
 
     def test_ledger_counts_twice(self):
         """The round's records stay, so that a second result of it is accepted like the first."""
@@ -144,6 +162,17 @@ class Mutants(unittest.TestCase):
         """The first round of a unit stays committed, without its light."""
         self.check(LEDGER, ("        if (is_kept || !committed(round)) continue;\n",
                             "        if (index == 0 || is_kept || !committed(round)) continue;\n"), seeds=300)
+
+    def test_a_server_of_other_bits_is_admitted(self):
+        self.check(JOINING, ("    if (misfit && !config_.relaxed)\n", "    if (misfit && config_.relaxed)\n"))
+
+    def test_a_round_of_other_bits_is_not_marked(self):
+        self.check(JOINING, ("    found->second.same_bits = !misfit;\n", ""), seeds=600)
+
+    def test_a_slow_server_is_called_stuck(self):
+        """As if the counter rose only with finished rounds."""
+        self.check("src/cluster/progress_watch.cpp",
+                   ("    if (counter > counter_ || leases == 0) {\n", "    if (leases == 0) {\n"), seeds=300)
 
     def test_a_server_says_ready_only_once(self):
         self.check(SERVER, ("    send_answer(message::Credit{session_, credits_, received_});\n    if (phase_ == Phase::work) send_ready();\n", ""))

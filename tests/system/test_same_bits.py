@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,15 @@ class SameBits(unittest.TestCase):
                         "75x50", "--spp", "6", "--seed", "3", *place, *options], check=True,
                        stderr=subprocess.DEVNULL, env=dict(os.environ, PATHSCOPE_SIMD=level))
         return json.loads(stats.read_text())["image_hash"]
+
+    def test_golden_round(self):
+        """What a server says of its bits does not depend on the instructions that this machine has."""
+        hashes = set()
+        for level in LEVELS:
+            run = subprocess.run([BIN.parent / "test_render", "-tc=the golden round is the same*"], check=True, capture_output=True,
+                                 text=True, env=dict(os.environ, PATHSCOPE_SIMD=level))
+            hashes.update(re.findall("golden hash: ([0-9a-f]{64})", run.stdout))
+        self.assertEqual(len(hashes), 1, hashes)
 
     def test_levels_trees_threads_servers(self):
         choices = list(itertools.product(LEVELS, ["wide", "two-wide"], [["--threads", "1"], ["--threads", "2"], ["--servers", "1"]]))

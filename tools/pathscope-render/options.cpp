@@ -109,6 +109,8 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
     app.add_option("--min-servers", client.min_servers, "begin when so many are ready (1 with --listen)")
         ->check(CLI::Range(0, 4096))
         ->type_name("N");
+    app.add_flag("--relaxed", client.relaxed,
+                 "admit servers whose bits may differ; the image is marked as not reproducible");
     add_ports(app, client.ports);
     add_lever(app, "--strategy", client.strategy,
               "what servers compute: indirect light, or arithmetic, to test servers with");

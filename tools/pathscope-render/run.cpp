@@ -144,6 +144,13 @@ void tell_how_to_join(const std::string& endpoint, const std::optional<ClientKey
                          keys ? fmt::format(" --key FILE --server-key '{}'", keys->pair.public_key) : ""));
 }
 
+/// What is said of an image for which --relaxed made a difference.
+std::string differing_bits(std::uint64_t rounds, const FrameWork& work) {
+    return fmt::format(
+        "{} of {} rounds came from servers whose bits may differ from the client's (--relaxed).", rounds,
+        work.indirect_ledger().rounds_committed());
+}
+
 }  // namespace
 
 Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& interrupted) {
@@ -195,6 +202,12 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     buffers.samples = settings.spp > 0 ? work.indirect().samples() : work.direct().samples();
     SaveOptions save;
     save.tone_map.exposure_ev = options.exposure_ev.value_or(opened->file.exposure_ev);
+    figures.reproducible = (*session)->differing_rounds() == 0;
+    if (!figures.reproducible) {
+        const std::string why = differing_bits((*session)->differing_rounds(), work);
+        log_warning("The image is not reproducible: " + why);
+        save.metadata.emplace("not_reproducible", why);
+    }
     const std::vector<ImageLayer> layers = make_layers(buffers, options.buffers);
     for (const auto& output : options.outputs)
         if (const auto saved = save_image(output, layers, save); !saved) return saved;

@@ -4,10 +4,11 @@
 ///     NEW --welcomed--> SYNCING --synced--> READY <--heard-- SUSPECT
 ///                          ^                 | |  --silent-->   |
 ///                          +---state_lost----+ +--drain--> DRAINING --left--> GONE
+///     READY or SUSPECT --stuck--> STUCK --moved--> READY
 ///     from any of these: --lost--> DEAD --removed--> GONE
 ///
 /// Busy or idle is not a state: a READY server is busy while the ledger says it holds a lease. One truth.
-/// SUSPECT keeps its leases (a copy of its rounds may go to others); DEAD loses them, its id is never used
+/// SUSPECT keeps its leases (a copy of its rounds may go to others); STUCK lives and loses them (progress_watch.hpp); DEAD loses them too, its id is never used
 /// again, and if it speaks it has to say HELLO anew. What the table does not list is refused and counted. No
 /// clock, no socket. Thread safety: one thread at a time.   Test: tests/cluster/test_peer.cpp
 
@@ -24,17 +25,29 @@
 
 namespace pathscope {
 
-enum class PeerState { fresh, syncing, ready, suspect, draining, dead, gone };
+enum class PeerState { fresh, syncing, ready, suspect, stuck, draining, dead, gone };
 
 inline constexpr std::array k_peer_state_names{
-    EnumName{PeerState::fresh, "NEW"},         EnumName{PeerState::syncing, "SYNCING"},
-    EnumName{PeerState::ready, "READY"},       EnumName{PeerState::suspect, "SUSPECT"},
-    EnumName{PeerState::draining, "DRAINING"}, EnumName{PeerState::dead, "DEAD"},
-    EnumName{PeerState::gone, "GONE"},
+    EnumName{PeerState::fresh, "NEW"},   EnumName{PeerState::syncing, "SYNCING"},
+    EnumName{PeerState::ready, "READY"}, EnumName{PeerState::suspect, "SUSPECT"},
+    EnumName{PeerState::stuck, "STUCK"}, EnumName{PeerState::draining, "DRAINING"},
+    EnumName{PeerState::dead, "DEAD"},   EnumName{PeerState::gone, "GONE"},
 };
 constexpr const auto& enum_table(PeerState) { return k_peer_state_names; }
 
-enum class PeerCause { welcomed, synced, state_lost, silent, heard, drain, left, lost, removed };
+enum class PeerCause {
+    welcomed,
+    synced,
+    state_lost,
+    silent,
+    heard,
+    stuck,
+    moved,
+    drain,
+    left,
+    lost,
+    removed
+};
 
 inline constexpr std::array k_peer_cause_names{
     EnumName{PeerCause::welcomed, "welcomed"},
@@ -42,6 +55,8 @@ inline constexpr std::array k_peer_cause_names{
     EnumName{PeerCause::state_lost, "state_lost"},
     EnumName{PeerCause::silent, "silent"},
     EnumName{PeerCause::heard, "heard"},
+    EnumName{PeerCause::stuck, "stuck"},
+    EnumName{PeerCause::moved, "moved"},
     EnumName{PeerCause::drain, "drain"},
     EnumName{PeerCause::left, "left"},
     EnumName{PeerCause::lost, "lost"},

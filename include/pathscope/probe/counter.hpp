@@ -27,14 +27,16 @@ enum class Counter {
     tiles,                ///< Results of servers that were merged.
     tile_bytes,           ///< Their payloads as they came...
     tile_bytes_unpacked,  ///< ...and unpacked.
+    differing_rounds,     ///< Of `tiles`, those of servers whose bits may differ from the client's.
     rays,
     bytes_in,
     bytes_out,
     messages_in,
     messages_out,
     servers_joined,
-    died,            ///< 1 for a server that was declared dead; in total, how many.
-    rounds_audited,  ///< Rounds that were rendered twice and compared; of the server that gave the first result.
+    stuck,             ///< How often a server answered heartbeats, but its work stood still.
+    died,              ///< 1 for a server that was declared dead; in total, how many.
+    rounds_audited,    ///< Rounds that were rendered twice and compared; of the server that gave the first result.
     audits_differing,  ///< Results that an audit found to be false.
     rounds_undone,     ///< Merged rounds that were taken back, since their block held false light.
     banned,            ///< Bans, of servers and of others that misbehaved.
@@ -57,12 +59,14 @@ inline constexpr std::array k_counter_names{
     EnumName{Counter::tiles, "tiles"},
     EnumName{Counter::tile_bytes, "tile_bytes"},
     EnumName{Counter::tile_bytes_unpacked, "tile_bytes_unpacked"},
+    EnumName{Counter::differing_rounds, "differing_rounds"},
     EnumName{Counter::rays, "rays"},
     EnumName{Counter::bytes_in, "bytes_in"},
     EnumName{Counter::bytes_out, "bytes_out"},
     EnumName{Counter::messages_in, "messages_in"},
     EnumName{Counter::messages_out, "messages_out"},
     EnumName{Counter::servers_joined, "servers_joined"},
+    EnumName{Counter::stuck, "stuck"},
     EnumName{Counter::died, "died"},
     EnumName{Counter::rounds_audited, "rounds_audited"},
     EnumName{Counter::audits_differing, "audits_differing"},

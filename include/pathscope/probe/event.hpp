@@ -72,7 +72,7 @@ enum class UnitReason {
     result,         ///< committed: the lease's result came in time.
     late_result,    ///< committed: it came after its lease had ended, and nobody was quicker.
     lease_expired,  ///< closed, reopened: the deadline passed.
-    server_lost,    ///< closed, reopened: its server died or left.
+    server_lost,    ///< closed, reopened: its server died, left, or is stuck.
     released,       ///< closed, reopened: the server gave it back, or its result could not be used.
     superseded,     ///< closed: another server's result was first.
     new_epoch,      ///< closed: the pixels mean something else now.

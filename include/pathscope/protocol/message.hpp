@@ -21,9 +21,10 @@
 
 namespace pathscope {
 
-enum class RejectCode { version, build, full, banned, malformed, closing };
+enum class RejectCode { version, build, bits, full, banned, malformed, closing };
 inline constexpr std::array k_reject_code_names{EnumName<RejectCode>{RejectCode::version, "version"},
                                                 EnumName<RejectCode>{RejectCode::build, "build"},
+                                                EnumName<RejectCode>{RejectCode::bits, "bits"},
                                                 EnumName<RejectCode>{RejectCode::full, "full"},
                                                 EnumName<RejectCode>{RejectCode::banned, "banned"},
                                                 EnumName<RejectCode>{RejectCode::malformed, "malformed"},
@@ -58,6 +59,7 @@ struct Hello {
     std::string build;
     std::uint32_t threads = 1;
     std::uint32_t pid = 0;
+    Digest golden{};
     bool operator==(const Hello&) const = default;
 };
 

@@ -36,11 +36,15 @@ struct RoundResult {
 /// Says between rows whether the work is still wanted.
 using CancelFlag = std::atomic<bool>;
 
+/// Rises by the samples that are done, many times while a row is rendered: who works moves it.
+using WorkCounter = std::atomic<std::uint64_t>;
+
 /// Returns nothing when `cancelled` became true. Requires: the round lies inside the frame of `settings`.
 [[nodiscard]] std::optional<RoundResult> render_round(const Scene& scene, const Camera& camera,
                                                       const RenderSettings& settings, LightPart part,
                                                       const Round& round, int threads,
-                                                      const CancelFlag* cancelled = nullptr);
+                                                      const CancelFlag* cancelled = nullptr,
+                                                      WorkCounter* work_done = nullptr);
 
 /// Both parts of a round, by walks that the two share (integrator/both_parts.hpp): the sums of render_round(), bit by bit.
 struct PartsResult {
@@ -49,7 +53,7 @@ struct PartsResult {
 };
 [[nodiscard]] std::optional<PartsResult> render_both_parts(const Scene& scene, const Camera& camera,
                                                            const RenderSettings& settings, const Round& round,
-                                                           int threads,
-                                                           const CancelFlag* cancelled = nullptr);
+                                                           int threads, const CancelFlag* cancelled = nullptr,
+                                                           WorkCounter* work_done = nullptr);
 
 }  // namespace pathscope

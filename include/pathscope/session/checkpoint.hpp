@@ -36,6 +36,7 @@ struct WorkHistory {
     std::uint64_t rounds = 0;  ///< Of indirect light.
     std::uint64_t tiles = 0, rays = 0, samples = 0, nonfinite_dropped = 0, saturated = 0;
     std::vector<DroppedSample> dropped;  ///< Some of those in nonfinite_dropped.
+    std::uint64_t differing_rounds = 0;  ///< Of servers whose bits may differ: above 0, the image is marked.
 };
 
 struct Checkpoint {

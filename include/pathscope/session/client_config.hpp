@@ -44,7 +44,8 @@ struct ClientConfig {
     std::filesystem::path server_program;
     std::string local_server_mesh_cache;  ///< Their --mesh-cache; empty = what they choose themselves.
 
-    int min_servers = 0;                   ///< Indirect light waits until so many are ready.
+    bool relaxed = false;  ///< Servers whose bits may differ come in too (admission.hpp), and mark the image.
+    int min_servers = 0;   ///< Indirect light waits until so many are ready.
     Strategy strategy = Strategy::blocks;  ///< What the servers compute. A checkpoint holds `blocks` only.
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;

@@ -26,8 +26,10 @@
 #include "pathscope/cluster/contributions.hpp"
 #include "pathscope/cluster/lease_policy.hpp"
 #include "pathscope/cluster/peer.hpp"
+#include "pathscope/cluster/progress_watch.hpp"
 #include "pathscope/probe/event_store.hpp"
 #include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/checkpoint.hpp"
 #include "pathscope/session/client_config.hpp"
 #include "pathscope/session/frame_work.hpp"
@@ -121,6 +123,8 @@ class ClientMachine {
     [[nodiscard]] const RenderState& state() const { return job_.state; }
     [[nodiscard]] Epoch epoch() const { return work_.epoch(); }
     [[nodiscard]] std::uint64_t saturated() const { return saturated_; }
+    /// Rounds of the frame that came from servers of other bits (admission.hpp). Above 0, the image is not reproducible.
+    [[nodiscard]] std::uint64_t differing_rounds() const { return differing_rounds_; }
     [[nodiscard]] const std::vector<DroppedSample>& dropped() const { return dropped_; }
     [[nodiscard]] const Conduct& conduct() const { return conduct_; }
 
@@ -132,6 +136,7 @@ class ClientMachine {
         std::uint32_t pid = 0;
         Peer peer;
         FailureDetector detector;
+        ProgressWatch progress;
         ClockEstimate clock{};
         std::optional<TimeNs> round_trip{};  ///< The shortest of late.
         TokenBucket allowance{};  ///< Of messages.
@@ -140,8 +145,11 @@ class ClientMachine {
         Turnaround turnaround{};
         TimeNs next_ping = 0;
         bool asks = false;  ///< Is in asking_.
+        bool same_bits = true;
 
-        [[nodiscard]] bool stays() const { return peer.alive() && peer.state() != PeerState::draining; }
+        [[nodiscard]] bool stays() const {
+            return peer.alive() && peer.state() != PeerState::draining && peer.state() != PeerState::stuck;
+        }
     };
     /// A round of the client's own renderer: one part of it, or both; or one that was rendered before.
     struct LocalWork {
@@ -152,6 +160,7 @@ class ClientMachine {
     /// Whose light is in the frame, though it may be gone.
     struct Author {
         std::string name, who;
+        bool same_bits = true;
     };
     /// A process that this client started.
     struct LocalServer {
@@ -184,8 +193,9 @@ class ClientMachine {
     void reject_banned(const std::string& instance, const Ban& ban);
 
     // client_joining.cpp: from HELLO to READY, and the way out.
-    [[nodiscard]] std::optional<std::string> reason_to_reject(const std::string& instance,
-                                                              const message::Hello& hello) const;
+    [[nodiscard]] std::optional<message::Reject> reason_to_reject(const std::string& instance,
+                                                                  const message::Hello& hello,
+                                                                  const std::optional<BitsMisfit>& misfit) const;
     void on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender);
     void on(Server& server, message::SnapshotRequest& message);
     void on(Server& server, message::ManifestRequest& message);
@@ -200,6 +210,7 @@ class ClientMachine {
     // client_heartbeats.cpp: who lives.
     void on(Server& server, message::Ping& message);
     void on(Server& server, message::Pong& message);
+    void watch_progress(Server& server);
     bool ping(Server& server);
     void probe_connections();
     void watch_heartbeats();
@@ -228,7 +239,7 @@ class ClientMachine {
     void cancel(const Lease& lease);
     void begin_local(LocalWork work);
     void release(LeaseId lease, ServerId server);
-    void revoke(ServerId server);
+    std::size_t revoke(ServerId server);  ///< How many rounds were reopened.
 
     // client_audit.cpp: a second opinion.
     void note_merged(LightPart part, const ResultClaim& claim, const RoundResult& result,
@@ -281,6 +292,7 @@ class ClientMachine {
     std::uint64_t last_ticket_ = 0;
     std::map<std::uint64_t, LocalWork> local_work_;  ///< In the client's renderer, by ticket.
     std::uint64_t saturated_ = 0;
+    std::uint64_t differing_rounds_ = 0;
     std::vector<DroppedSample> dropped_;  ///< The first k_max_dropped_listed.
     bool stopped_ = false;
 };

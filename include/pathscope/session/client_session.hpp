@@ -44,6 +44,7 @@ class ClientSession : private ClientWorld {
     [[nodiscard]] const RenderState& state() const { return machine_.state(); }
     [[nodiscard]] Epoch epoch() const { return machine_.epoch(); }
     [[nodiscard]] std::uint64_t saturated() const { return machine_.saturated(); }
+    [[nodiscard]] std::uint64_t differing_rounds() const { return machine_.differing_rounds(); }
     [[nodiscard]] const std::vector<DroppedSample>& dropped() const { return machine_.dropped(); }
 
     /// Wakes step() up, from any thread or signal handler.

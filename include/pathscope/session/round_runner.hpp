@@ -6,11 +6,13 @@
 ///
 /// One round at a time, its rows on `threads` threads; the others wait in order. Every round that was begun has exactly
 /// one outcome, a cancelled one an empty one, within a row's time.
+/// work_done() rises all the while that a round is in work; if it stands still, whoever renders is stuck.
 /// A speed cap stretches each round to the time that it would take at so many samples per second: a slow machine, for
 /// lessons and for scaling tests on few cores.
 /// Thread safety: begin, cancel and take_finished from one thread.   Test: tests/session/test_round_runner.cpp
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -49,7 +51,9 @@ struct RoundOutcome {
 class RoundRunner {
   public:
     /// threads: 0 = all cores. samples_per_second: 0 = no cap. Requires: `wake` outlives the runner.
-    RoundRunner(const WakePair& wake, int threads, double samples_per_second = 0);
+    /// before_round: called first thing of each round, on the thread that renders; what it takes, the round takes.
+    RoundRunner(const WakePair& wake, int threads, double samples_per_second = 0,
+                std::function<void()> before_round = {});
     ~RoundRunner();  ///< Cancels and waits.
 
     void begin(RoundJob job);
@@ -57,16 +61,21 @@ class RoundRunner {
     void cancel_all();
     [[nodiscard]] std::vector<RoundOutcome> take_finished();
 
+    [[nodiscard]] std::uint64_t work_done() const { return work_done_.load(std::memory_order_relaxed); }
+
     [[nodiscard]] std::size_t pending() const { return cancellations_.size(); }  ///< Begun and not taken.
 
   private:
     class Cancellation;
 
-    void render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome) const;
-    [[nodiscard]] RoundOutcome run(const RoundJob& job, Cancellation& cancellation) const;
+    void render(const RoundJob& job, const CancelFlag& cancelled, RoundOutcome& outcome);
+    void wait_until(TimeNs moment, Cancellation& cancellation);
+    [[nodiscard]] RoundOutcome run(const RoundJob& job, Cancellation& cancellation);
 
     int threads_;
     double samples_per_second_;
+    std::function<void()> before_round_;
+    WorkCounter work_done_{0};  ///< In samples, or what takes as long.
     std::map<std::uint64_t, std::shared_ptr<Cancellation>> cancellations_;
     Mailbox<RoundOutcome> finished_;
     Worker worker_;  // Last, so that it ends first.

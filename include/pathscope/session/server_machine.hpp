@@ -20,6 +20,7 @@
 #include "pathscope/core/result.hpp"
 #include "pathscope/protocol/block_result.hpp"
 #include "pathscope/protocol/codec.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/render_state.hpp"
 #include "pathscope/session/round_runner.hpp"
 #include "pathscope/session/scene_cache.hpp"
@@ -31,7 +32,7 @@ namespace pathscope {
 struct ServerIdentity {
     std::string name;  ///< For people.
     std::string version;
-    std::string build;  ///< build_identity() of the program.
+    BitsIdentity bits;  ///< own_bits() of the program.
     std::uint32_t threads = 1;
     std::uint32_t pid = 0;
     std::string client = "127.0.0.1";  ///< Whom it dials, for sentences.
@@ -57,6 +58,9 @@ class ServerWorld {
     virtual void begin(RoundJob job) = 0;
     virtual void cancel(std::uint64_t ticket) = 0;
     virtual void cancel_all() = 0;
+
+    /// A number that rises while rounds are worked on, within a round as well: heartbeats carry it.
+    [[nodiscard]] virtual std::uint64_t work_done() const = 0;
 
     /// Begins to load a scene whose files are in the cache; it comes back by on_loaded(). One at a time.
     virtual void load(RenderState state, Manifest manifest) = 0;
@@ -194,7 +198,6 @@ class ServerMachine {
     std::uint64_t last_ticket_ = 0;  ///< Lease numbers repeat from client to client, tickets do not.
     std::deque<Frames>
         unsent_answers_;  ///< TILE and NACK that the socket would not take yet; bounded by credits.
-    std::uint64_t samples_done_ = 0;
 };
 
 }  // namespace pathscope

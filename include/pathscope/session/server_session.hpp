@@ -10,6 +10,7 @@
 #include <array>
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,6 +35,8 @@ struct ServerConfig {
     TreeKind tree = TreeKind::wide;
     double samples_per_second = 0;  ///< Speed cap; 0 = none.
     std::filesystem::path cache_folder;
+    std::optional<BitsIdentity> claimed_bits;  ///< What HELLO says in place of the truth: for tests.
+    std::function<void()> before_round;        ///< On the thread that renders: for tests, where it may block.
     std::optional<MeshCache> mesh_cache;
 };
 
@@ -71,6 +74,7 @@ class ServerSession : private ServerWorld {
     void begin(RoundJob job) override { runner_.begin(std::move(job)); }
     void cancel(std::uint64_t ticket) override { runner_.cancel(ticket); }
     void cancel_all() override { runner_.cancel_all(); }
+    [[nodiscard]] std::uint64_t work_done() const override { return runner_.work_done(); }
     void load(RenderState state, Manifest manifest) override;
 
     ServerConfig config_;
