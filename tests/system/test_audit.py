@@ -14,7 +14,7 @@ import unittest
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
-WIDTH, HEIGHT, SPP, DIRECT_SPP = 160, 120, 16, 2
+WIDTH, HEIGHT, SPP, DIRECT_SPP = 160, 120, 16, 8
 JOB = ["--size", f"{WIDTH}x{HEIGHT}", "--spp", str(SPP), "--direct-spp", str(DIRECT_SPP), "--seed", "7"]
 PATIENCE_S = 300
 
