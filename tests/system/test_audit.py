@@ -1,7 +1,7 @@
 """A server that lies: a real one of which one bit of one result in nine is false, beside an honest one. It is found and shut
 out, and the image has the same bits as the render without servers.
 
-    test_audit.py BIN      BIN: the folder of pathscope-render, pathscope-server and lying-server
+    test_audit.py BIN LIAR      BIN: the folder of pathscope-render and pathscope-server; LIAR: the program lying-server
 """
 import json
 import os
@@ -13,8 +13,9 @@ import tempfile
 import unittest
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+LIAR = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
-WIDTH, HEIGHT, SPP, DIRECT_SPP = 160, 120, 16, 2
+WIDTH, HEIGHT, SPP, DIRECT_SPP = 160, 120, 16, 8
 JOB = ["--size", f"{WIDTH}x{HEIGHT}", "--spp", str(SPP), "--direct-spp", str(DIRECT_SPP), "--seed", "7"]
 PATIENCE_S = 300
 
@@ -43,9 +44,10 @@ class Audit(unittest.TestCase):
             [BIN / "pathscope-render", SCENE, "-o", pathlib.Path(self.folder.name) / "image.pfm", "--stats", stats, *JOB,
              *(["--listen", "127.0.0.1", "--ports", ports, "--min-servers", str(len(servers))] if servers else []),
              *options], env=self.environment, stderr=subprocess.PIPE, text=True)
-        started = [subprocess.Popen([BIN / program, "--connect", "127.0.0.1", "--ports", ports, "--threads", "1", "--name",
-                                     f"{program}-{i}", "--quiet"], env=self.environment, stderr=subprocess.DEVNULL)
-                   for i, program in enumerate(servers)]
+        started = [
+            subprocess.Popen([LIAR if program == LIAR.name else BIN / program, "--connect", "127.0.0.1", "--ports", ports,
+                              "--threads", "1", "--name", f"{program}-{i}", "--quiet"], env=self.environment,
+                             stderr=subprocess.DEVNULL) for i, program in enumerate(servers)]
         try:
             said = client.communicate(timeout=PATIENCE_S)[1]
         finally:
