@@ -22,11 +22,10 @@ TimeNs dead_after_of(DetectorKind kind) {
 
 /// For good, as it is.
 std::optional<message::Reject> ClientMachine::reason_to_reject(
-    const std::string& instance, const message::Hello& hello,
-    const std::optional<BitsMisfit>& misfit) const {
+    const std::string& instance, const message::Hello& hello, const std::optional<BitsMisfit>& misfit) const {
     if (hello.instance != instance)
-        return message::Reject{RejectCode::malformed,
-                               "HELLO names another instance than its connection has.", 0};
+        return message::Reject{RejectCode::malformed, "HELLO names another instance than its connection has.",
+                               0};
     if (misfit && !config_.relaxed)
         return message::Reject{misfit->code, fmt::format("{} {}", misfit->what, misfit->remedy), 0};
     return std::nullopt;
@@ -59,11 +58,11 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
             return;
         }
         const ServerId id{++last_server_};
-        found = servers_
-                    .emplace(instance, Server{instance, hello.name, who, hello.pid, Peer(id, now_),
-                                              FailureDetector(config_.detector, now_),
-                                              ProgressWatch(heartbeat_)})
-                    .first;
+        found =
+            servers_
+                .emplace(instance, Server{instance, hello.name, who, hello.pid, Peer(id, now_),
+                                          FailureDetector(config_.detector, now_), ProgressWatch(heartbeat_)})
+                .first;
         found->second.next_ping = next_look_ = now_;
         found->second.allowance = TokenBucket(config_.conduct.messages, now_);
         server_by_id_.emplace(id, &found->second);

@@ -59,6 +59,7 @@ void SimulatedCluster::start_client() {
                  [&server = *server] { server.when_awake([&server] { server.connection_lost(); }); });
 }
 
+/// What happened to a client that is about to end.
 void SimulatedCluster::count_client() {
     const EventStore& store = client_->store();
     totals_.bad_messages += store.total(Counter::bad_messages);
@@ -67,6 +68,7 @@ void SimulatedCluster::count_client() {
     totals_.audited += store.total(Counter::rounds_audited);
     totals_.unmasked += store.total(Counter::audits_differing);
     totals_.undone += store.total(Counter::rounds_undone);
+    totals_.stuck += store.total(Counter::stuck);
 }
 
 void SimulatedCluster::start_server() {
@@ -80,13 +82,6 @@ void SimulatedCluster::plan_hang(TimeNs at, TimeNs duration) {
         for (const auto& server : servers_) server->hang(time_.now() + duration);
         ++totals_.hangs;
     });
-}
-
-/// What happened to a client that is about to end.
-void SimulatedCluster::count_client() {
-    totals_.bad_messages += client_->store().total(Counter::bad_messages);
-    totals_.deaths += client_->store().total(Counter::died);
-    totals_.stuck += client_->store().total(Counter::stuck);
 }
 
 template <class Arrive>

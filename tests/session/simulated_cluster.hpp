@@ -125,7 +125,6 @@ class SimulatedCluster {
     void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);
     [[nodiscard]] bool someone_can_work() const;
     [[nodiscard]] bool done() const;
-    void count_client();
     /// Whether each sum is to be that of its samples: at any time, or at the end at least.
     [[nodiscard]] bool always_honest() const { return settings_.liars == 0 || settings_.lie == 0; }
     [[nodiscard]] bool honest_at_the_end() const { return always_honest() || settings_.audit >= 1; }

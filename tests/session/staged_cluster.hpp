@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "pathscope/session/build_identity.hpp"
+#include "pathscope/session/admission.hpp"
 #include "pathscope/session/client_machine.hpp"
 #include "pathscope/session/server_machine.hpp"
 
@@ -46,9 +46,9 @@ class StagedCluster : private ClientWorld {
         Server(StagedCluster& stage, int number)
             : stage_(stage),
               number_(number),
-              machine_({fmt::format("server-{}", number), "0", std::string(build_identity()), 1,
-                        std::uint32_t(number), "client"},
-                       SceneCache({}), *this) {}
+              machine_(
+                  {fmt::format("server-{}", number), "0", own_bits(), 1, std::uint32_t(number), "client"},
+                  SceneCache({}), *this) {}
 
         void receive(Frames frames, Channel channel) {
             if (cut || killed || !machine_.linked()) return;
@@ -72,16 +72,18 @@ class StagedCluster : private ClientWorld {
             if (!jobs_.empty() && (renders || cancelled_.contains(jobs_.front().ticket))) {
                 RoundOutcome outcome = finish(jobs_.front(), cancelled_.contains(jobs_.front().ticket));
                 jobs_.pop_front();
+                ++done_;
                 machine_.on_outcome(outcome, stage_.now_);
             }
             machine_.on_timers(stage_.now_);
         }
 
-        bool send(Channel channel, Frames frames) override {
+        bool send(Channel channel, Frames&& frames) override {
             if (!cut) stage_.to_client(instance_, channel, std::move(frames));
             return true;
         }
         void begin(RoundJob job) override { jobs_.push_back(std::move(job)); }
+        [[nodiscard]] std::uint64_t work_done() const override { return done_; }
         void cancel(std::uint64_t ticket) override { cancelled_.insert(ticket); }
         void cancel_all() override {
             for (const RoundJob& job : jobs_) cancel(job.ticket);
@@ -93,6 +95,7 @@ class StagedCluster : private ClientWorld {
         std::string instance_;
         std::deque<RoundJob> jobs_;
         std::set<std::uint64_t> cancelled_;
+        std::uint64_t done_ = 0;
         std::optional<RenderState> wanted_;
         ServerMachine machine_;
     };

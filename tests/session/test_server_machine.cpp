@@ -104,7 +104,7 @@ TEST_CASE("a client that grants without end and takes no answer does not fill th
 TEST_CASE("a banned server leaves at once, is silent until the ban's end, and then says HELLO") {
     const TemporaryFolder folder;
     StoppableWorld world;
-    ServerMachine server({"server", "0", "build", 1, 7, "client"}, SceneCache(folder.path()), world);
+    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
     TimeNs now = k_second_ns;
     const auto say = [&](Message message) {
         const Channel channel = k_message_table[message.index()].channel;

@@ -82,8 +82,8 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
         all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.hangs,
         all.stuck, all.drains, all.joins, all.pauses, all.restarts, all.new_states, all.deaths, all.bans,
         all.failures, all.refused_bits, all.marked_images, all.lies, all.audited, all.unmasked, all.undone,
-        c.granted, c.expired, c.revoked, c.released, c.superseded,
-        c.dropped, c.copied, c.reallocated, c.accepted, c.late, c.duplicates, c.stale, c.unknown));
+        c.granted, c.expired, c.revoked, c.released, c.superseded, c.dropped, c.copied, c.reallocated,
+        c.accepted, c.late, c.duplicates, c.stale, c.unknown));
     if (count < 2000) return;
     CHECK(all.most_leases > 2 * k_least_credits);  // Wires are slow at times, and rounds are short.
     // The simulation is worth its name only if everything does happen in it.

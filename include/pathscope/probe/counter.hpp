@@ -34,9 +34,9 @@ enum class Counter {
     messages_in,
     messages_out,
     servers_joined,
-    stuck,             ///< How often a server answered heartbeats, but its work stood still.
-    died,              ///< 1 for a server that was declared dead; in total, how many.
-    rounds_audited,    ///< Rounds that were rendered twice and compared; of the server that gave the first result.
+    stuck,           ///< How often a server answered heartbeats, but its work stood still.
+    died,            ///< 1 for a server that was declared dead; in total, how many.
+    rounds_audited,  ///< Rounds that were rendered twice and compared; of the server that gave the first result.
     audits_differing,  ///< Results that an audit found to be false.
     rounds_undone,     ///< Merged rounds that were taken back, since their block held false light.
     banned,            ///< Bans, of servers and of others that misbehaved.

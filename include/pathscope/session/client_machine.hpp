@@ -21,9 +21,9 @@
 
 #include "pathscope/cluster/audit.hpp"
 #include "pathscope/cluster/clock_offset.hpp"
-#include "pathscope/cluster/figures.hpp"
 #include "pathscope/cluster/conduct.hpp"
 #include "pathscope/cluster/contributions.hpp"
+#include "pathscope/cluster/figures.hpp"
 #include "pathscope/cluster/lease_policy.hpp"
 #include "pathscope/cluster/peer.hpp"
 #include "pathscope/cluster/progress_watch.hpp"
@@ -139,7 +139,7 @@ class ClientMachine {
         ProgressWatch progress;
         ClockEstimate clock{};
         std::optional<TimeNs> round_trip{};  ///< The shortest of late.
-        TokenBucket allowance{};  ///< Of messages.
+        TokenBucket allowance{};             ///< Of messages.
         Credits credits{0};
         SpeedEstimate speed{};
         Turnaround turnaround{};
@@ -193,9 +193,9 @@ class ClientMachine {
     void reject_banned(const std::string& instance, const Ban& ban);
 
     // client_joining.cpp: from HELLO to READY, and the way out.
-    [[nodiscard]] std::optional<message::Reject> reason_to_reject(const std::string& instance,
-                                                                  const message::Hello& hello,
-                                                                  const std::optional<BitsMisfit>& misfit) const;
+    [[nodiscard]] std::optional<message::Reject> reason_to_reject(
+        const std::string& instance, const message::Hello& hello,
+        const std::optional<BitsMisfit>& misfit) const;
     void on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender);
     void on(Server& server, message::SnapshotRequest& message);
     void on(Server& server, message::ManifestRequest& message);
