@@ -44,13 +44,13 @@ std::optional<Lease> ClientMachine::grant_audit(ServerId server, TimeNs duration
     return lease;
 }
 
-/// What the client has to render itself: a dispute, or a round whose author is the only server.
+/// What the client has to render itself: a dispute, or a round whose author is the only server that can be compared with.
 std::optional<AuditedRound> ClientMachine::next_local_audit(bool disputes_only) const {
     if (audit_.settled()) return std::nullopt;
     int others = 0;
     ServerId other;
     for (auto it = servers_.begin(); it != servers_.end() && others < 2 && !disputes_only; ++it)
-        if (it->second.stays()) {
+        if (it->second.stays() && it->second.same_bits) {
             ++others;
             other = it->second.peer.id();
         }

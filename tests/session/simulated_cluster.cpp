@@ -218,10 +218,10 @@ void SimulatedCluster::strike() {
     }
 }
 
-TimeNs SimulatedCluster::end_of_bans() const {
+TimeNs SimulatedCluster::end_of_bans(TimeNs after) const {
     TimeNs end = 0;
     for (const auto& server : servers_)
-        if (const auto ban = client_->machine().conduct().ban_of(server->conduct_name(), time_.now()))
+        if (const auto ban = client_->machine().conduct().ban_of(server->conduct_name(), after))
             end = std::max(end, ban->until);
     return end;
 }
@@ -234,8 +234,8 @@ std::string SimulatedCluster::run() {
     const TimeNs epilogue = settings_.detector == DetectorKind::fixed ? k_slow_epilogue : k_epilogue;
     TimeNs end = k_longest_run;
     while (failure_.empty() && !time_.empty()) {
-        // Who is banned comes back by itself.
-        if (time_.next() > end) end = std::max(end, end_of_bans() + epilogue);
+        // Who is banned comes back by itself, and has its time for that.
+        if (time_.next() > end) end = std::max(end, end_of_bans(time_.now() - epilogue) + epilogue);
         if (time_.next() > end) break;
         time_.step();
         ++totals_.events;

@@ -127,8 +127,12 @@ class SimulatedCluster {
     [[nodiscard]] bool done() const;
     /// Whether each sum is to be that of its samples: at any time, or at the end at least.
     [[nodiscard]] bool always_honest() const { return settings_.liars == 0 || settings_.lie == 0; }
-    [[nodiscard]] bool honest_at_the_end() const { return always_honest() || settings_.audit >= 1; }
-    [[nodiscard]] TimeNs end_of_bans() const;
+    /// What servers of other bits give cannot be audited.
+    [[nodiscard]] bool honest_at_the_end() const {
+        const bool all_audited = settings_.audit >= 1 && !(settings_.relaxed && settings_.differing > 0);
+        return always_honest() || all_audited;
+    }
+    [[nodiscard]] TimeNs end_of_bans(TimeNs after) const;
 
     ClusterSettings settings_;
     ClusterTotals totals_;
