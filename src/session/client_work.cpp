@@ -168,7 +168,7 @@ std::optional<ClientMachine::LocalWork> ClientMachine::next_local_work() {
         work.indirect = work_.grant_indirect(k_local_server, now_,
                                              [](const Round&, std::uint32_t) { return k_no_deadline; });
     };
-    if (work_.indirect_progress() > work_.direct_progress()) work.direct = work_.grant_direct(now_);
+    if (work_.direct_is_behind()) work.direct = work_.grant_direct(now_);
     if (!work.direct) take_indirect();
     if (work.indirect)
         work.direct = work_.grant_direct_beside(*work.indirect, now_);

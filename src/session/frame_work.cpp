@@ -209,6 +209,12 @@ double FrameWork::progress(const Part& part) const {
            (double(part.ledger.plan().rounds_per_unit()) * double(grid_.count()));
 }
 
+bool FrameWork::direct_is_behind() const {
+    if (!has_image() || has_end(direct_) != has_end(indirect_))
+        return indirect_.ledger.rounds_committed() > direct_.ledger.rounds_committed();
+    return indirect_progress() > direct_progress();
+}
+
 void FrameWork::stop() {
     direct_.ledger.stop();
     indirect_.ledger.stop();

@@ -141,6 +141,29 @@ TEST_CASE("there is a picture once each block has a round of each part") {
 }
 
 TEST_CASE(
+    "however unlike the budgets of both parts, there is a picture after a round of each for each block") {
+    constexpr std::uint32_t k_many = 1'000'000;
+    for (const auto& [direct_spp, spp] :
+         {std::pair{1u, k_open_ended}, {k_open_ended, 1u}, {2u, k_many}, {k_many, 2u}}) {
+        CAPTURE(spp);
+        RenderSettings settings = small_frame();
+        settings.direct_spp = direct_spp;
+        settings.spp = spp;
+        SmallWork frame(settings);
+        int rounds = 0;
+        while (!frame.work.has_image() && rounds < 1000) {
+            const LightPart part = frame.work.direct_is_behind() ? LightPart::direct : LightPart::indirect;
+            const LightPart other = part == LightPart::direct ? LightPart::indirect : LightPart::direct;
+            const auto lease = frame.grant(part);
+            if (lease) REQUIRE(frame.commit(part, *lease) == Verdict::accepted);
+            if (!lease) REQUIRE(frame.commit(other, *frame.grant(other)) == Verdict::accepted);
+            ++rounds;
+        }
+        CHECK(rounds == 2 * 15);
+    }
+}
+
+TEST_CASE(
     "a unit that is undone is black, its rounds are open again, and done again it holds the same light") {
     SmallWork frame;
     frame.finish(LightPart::indirect);

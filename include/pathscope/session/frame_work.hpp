@@ -92,6 +92,9 @@ class FrameWork {
     /// Share of the samples that are in the image, 0 to 1.
     [[nodiscard]] double direct_progress() const { return progress(direct_); }
     [[nodiscard]] double indirect_progress() const { return progress(indirect_); }
+    /// Whether direct light is the part to go on with, so that both grow evenly: by their shares; but round for round until
+    /// there is a picture, and if one part goes on until stop() and the other does not.
+    [[nodiscard]] bool direct_is_behind() const;
     [[nodiscard]] bool direct_complete() const { return complete(direct_); }
     [[nodiscard]] bool complete() const { return complete(direct_) && complete(indirect_); }
 
@@ -145,6 +148,9 @@ class FrameWork {
     void finish_passes();
     [[nodiscard]] double summed_squared_error(const Part& part) const;
     [[nodiscard]] double progress(const Part& part) const;
+    [[nodiscard]] bool has_end(const Part& part) const {
+        return part.samples < (staged() ? k_sequence_samples : k_open_ended);
+    }
     [[nodiscard]] bool complete(const Part& part) const {
         return part.samples == 0 || part.ledger.complete();
     }
