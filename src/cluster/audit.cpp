@@ -42,9 +42,11 @@ bool Audit::on_merged(const AuditedRound& merged) {
 
 // ---- The second opinion of a server.
 
-std::optional<AuditedRound> Audit::next_for(ServerId server) const {
+std::optional<AuditedRound> Audit::next_for(ServerId server,
+                                            const std::function<bool(ServerId)>& may_judge) const {
     for (const auto& [author, rounds] : open_)
-        if (author != server) return round_of(*items_.find(*rounds.begin()));
+        if (author != server && (!may_judge || may_judge(author)))
+            return round_of(*items_.find(*rounds.begin()));
     return std::nullopt;
 }
 

@@ -96,7 +96,10 @@ Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> su
     if (!unpacked) return bad_input("TILE: " + unpacked.error().message);
     if (!all_in_range(sums, tile.count))
         return bad_input(fmt::format("TILE: a sum is beyond what {} samples can add up to.", tile.count));
-    return {};
+    // Whoever sends more than was agreed on counts for as much as all others: their results have to be comparable.
+    return agreed == WireFormat::exact
+               ? Result<void>()
+               : read_rounded_sums(agreed, round_sums(agreed, sums), tile.count, sums);
 }
 
 Result<std::vector<PixelSum>> block_result(const message::Tile& tile, std::int64_t pixels,

@@ -28,35 +28,40 @@ void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, const 
         serve_all_ = true;  // Another server than this one may have nothing to do.
 }
 
-std::optional<Lease> ClientMachine::grant_audit(ServerId server, TimeNs duration) {
-    const std::optional<AuditedRound> item = audit_.next_for(server);
-    if (!item) return std::nullopt;
+/// A round for a second opinion of this server. Not of servers of other bits, who may differ without a lie.
+std::optional<AuditedRound> ClientMachine::next_audit(const Server& server) const {
+    if (audit_.settled() || !server.same_bits) return std::nullopt;
+    return audit_.next_for(server.peer.id(),
+                           [&](ServerId author) { return authors_.at(author).who != server.who; });
+}
+
+Lease ClientMachine::grant_audit(const AuditedRound& item, ServerId server, TimeNs duration) {
     const Lease lease{work_.indirect_ledger().new_lease_id(),
                       work_.epoch(),
-                      item->round.unit,
-                      item->samples.first,
-                      item->samples.count,
+                      item.round.unit,
+                      item.samples.first,
+                      item.samples.count,
                       server,
                       now_,
                       now_ + duration,
-                      true};
-    audit_.grant(*item, lease);
+                      false};
+    audit_.grant(item, lease);
     return lease;
 }
 
 /// What the client has to render itself: a dispute, or a round whose author is the only server that can be compared with.
 std::optional<AuditedRound> ClientMachine::next_local_audit(bool disputes_only) const {
     if (audit_.settled()) return std::nullopt;
-    int others = 0;
-    ServerId other;
-    for (auto it = servers_.begin(); it != servers_.end() && others < 2 && !disputes_only; ++it)
-        if (it->second.stays() && it->second.same_bits) {
-            ++others;
-            other = it->second.peer.id();
-        }
-    if (others > 1) disputes_only = true;
-    return audit_.next_for_client(
-        [&](ServerId author) { return !disputes_only && (others == 0 || other == author); });
+    // One is enough, and of a thousand the first two tell whether there is one beside any author.
+    std::vector<std::string_view> judges;
+    for (auto it = servers_.begin(); it != servers_.end() && judges.size() < 2 && !disputes_only; ++it)
+        if (it->second.peer.accepts_work() && it->second.same_bits &&
+            (judges.empty() || judges.front() != it->second.who))
+            judges.push_back(it->second.who);
+    if (judges.size() > 1) disputes_only = true;
+    return audit_.next_for_client([&](ServerId author) {
+        return !disputes_only && (judges.empty() || judges.front() == authors_.at(author).who);
+    });
 }
 
 // ---- Opinions.
@@ -128,6 +133,7 @@ std::size_t ClientMachine::undo(const std::vector<std::uint32_t>& units) {
         });
     }
     store_.count(Counter::rounds_undone, undone);
+    last_undone_ = work_.indirect_ledger().new_lease_id();
     servers_changed();
     return undone;
 }

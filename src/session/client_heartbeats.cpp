@@ -54,6 +54,8 @@ void ClientMachine::watch_progress(Server& server) {
         servers_changed();
     } else if (!stuck && state == PeerState::stuck) {
         step_peer(server, PeerCause::moved, "Its work goes on.");
+        server.moved = now_;
+        server.turnaround = {};
         log_note(fmt::format("{} is no longer stuck.", server.name));
         servers_changed();
     }

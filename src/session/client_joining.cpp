@@ -37,13 +37,16 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
     const std::optional<BitsMisfit> misfit = depends_on_build(config_.strategy)
                                                  ? bits_misfit(own_bits(), {hello.build, hello.golden})
                                                  : std::nullopt;
-    if (auto reject = reason_to_reject(instance, hello, misfit)) {
+    auto found = servers_.find(instance);
+    auto reject = reason_to_reject(instance, hello, misfit);
+    if (!reject && found != servers_.end() && found->second.same_bits == misfit.has_value())
+        reject = message::Reject{RejectCode::malformed, "HELLO says other bits than it said before.", 0};
+    if (reject) {
         log_warning(fmt::format("Refused the server {}: {}", hello.name, reject->text));
         const bool malformed = reject->code == RejectCode::malformed;
         send(Channel::monitor, instance, std::move(*reject));
         return malformed ? offend(who, Offence::malformed) : void();
     }
-    auto found = servers_.find(instance);
     if (found != servers_.end()) {
         // It did not hear the WELCOME, or forgot its work: it starts over under the same id.
         Server& server = found->second;
@@ -164,6 +167,8 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
                          open == 1 ? "es" : ""));
     std::erase(asking_, &server);
     server_by_id_.erase(id);
+    if (const ServerId ids[]{id}; gave_indirect_.units_of(ids).empty() && !audit_.disputes(id))
+        authors_.erase(id);
     servers_.erase(found);
     servers_changed();
 }

@@ -135,7 +135,7 @@ void ClientMachine::begin_epoch(const PackMap& changes, bool same_frame) {
     world_.cancel_all();
     same_frame ? work_.begin_anew(job_.state.settings, epoch, now_)
                : work_.begin(job_.state.settings, epoch, now_);
-    differing_rounds_ = 0;
+    if (!same_frame) differing_rounds_ = 0;  // Those of a checkpoint stay.
     audit_.begin();
     gave_direct_.clear();
     gave_indirect_.clear();

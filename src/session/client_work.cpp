@@ -91,7 +91,8 @@ void ClientMachine::hand_out_to_servers() {
 bool ClientMachine::hand_out_to(Server& server) {
     while (server.peer.accepts_work() && server.credits.available() &&
            server.credits.owed() < window_of(server)) {
-        if (work_.indirect_ledger().outstanding() >= most_leases(most_result_bytes())) return false;
+        const std::size_t outstanding = work_.indirect_ledger().outstanding() + audit_.outstanding();
+        if (outstanding >= most_leases(most_result_bytes())) return false;
         if (!grant_to(server)) return true;
     }
     return false;
@@ -121,8 +122,9 @@ bool ClientMachine::grant_to(Server& server) {
     };
     std::optional<Lease> lease;
     // First: the sooner a liar is found, the less is to be undone.
-    if (const auto item = server.same_bits ? audit_.next_for(id) : std::nullopt)
-        lease = grant_audit(id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
+    if (const auto item = next_audit(server))
+        lease =
+            grant_audit(*item, id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
     if (!lease) lease = work_.grant_indirect(id, now_, duration);
     if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
         // Nothing is open, but another server may be late with its last rounds.
@@ -243,7 +245,9 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     if (const Verdict verdict = work_.indirect_ledger().judge(claim);
         !audits && verdict != Verdict::accepted) {
         work_.commit(LightPart::indirect, claim, {}, now_);
-        const bool never_granted = verdict == Verdict::unknown || verdict == Verdict::mismatched;
+        // Of rounds that were undone, results were on their way.
+        const bool never_granted =
+            (verdict == Verdict::unknown || verdict == Verdict::mismatched) && tile.lease > last_undone_;
         return never_granted ? offend(server.who, Offence::unknown_lease) : void();
     }
     const PixelRect rect = work_.rect_of(tile.unit);
@@ -268,7 +272,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     store_.count_all(
         {{Counter::tile_bytes, tile.result.size()}, {Counter::tile_bytes_unpacked, tile.raw_bytes}}, id);
     server.speed.add(double(result.samples), tile.render_ns);
-    server.turnaround.add(commit.since_grant);
+    if (now_ - commit.since_grant >= server.moved) server.turnaround.add(commit.since_grant);
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
     if (!server.same_bits) {

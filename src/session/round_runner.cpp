@@ -77,6 +77,7 @@ void RoundRunner::render(const RoundJob& job, const CancelFlag& cancelled, Round
         RoundResult& result = outcome.result.emplace();
         result.sums = flat_sums(job.round.rect, job.round.first, job.round.count);
         result.samples = job.round.samples();
+        work_done_.fetch_add(result.samples, std::memory_order_relaxed);
         if (job.direct_too)
             outcome.direct = render_round(*job.scene, job.camera, job.settings, LightPart::direct, job.round,
                                           threads_, &cancelled);

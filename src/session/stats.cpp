@@ -95,7 +95,7 @@ std::string stats_json(const RenderState& state, const EventStore& store, const 
               {"samples", total(Counter::samples)},
               {"samples_per_s", per_second(total(Counter::samples), figures.render_s)},
               {"image_hash", to_hex(figures.image_hash)},
-              {"reproducible", figures.reproducible && state.settings.wire == WireFormat::exact},
+              {"reproducible", figures.reproducible},
               {"estimated_error", figures.estimated_error ? Json(*figures.estimated_error) : Json()},
               {"samples_per_pixel_min", figures.samples_per_pixel.min},
               {"samples_per_pixel_mean", figures.samples_per_pixel.mean},

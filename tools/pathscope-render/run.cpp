@@ -144,11 +144,17 @@ void tell_how_to_join(const std::string& endpoint, const std::optional<ClientKey
                          keys ? fmt::format(" --key FILE --server-key '{}'", keys->pair.public_key) : ""));
 }
 
-/// What is said of an image for which --relaxed made a difference.
-std::string differing_bits(std::uint64_t rounds, const FrameWork& work) {
-    return fmt::format(
-        "{} of {} rounds came from servers whose bits may differ from the client's (--relaxed).", rounds,
-        work.indirect_ledger().rounds_committed());
+/// Why another run may give other bits; empty if it may not.
+std::string why_not_reproducible(std::uint64_t differing_rounds, WireFormat wire, const FrameWork& work) {
+    std::string why;
+    if (differing_rounds > 0)
+        why = fmt::format(
+            "{} of {} rounds came from servers whose bits may differ from the client's (--relaxed).",
+            differing_rounds, work.indirect_ledger().rounds_committed());
+    if (wire != WireFormat::exact)
+        why +=
+            fmt::format("{}Light lost bits on its way (--wire {}).", why.empty() ? "" : " ", name_of(wire));
+    return why;
 }
 
 }  // namespace
@@ -175,9 +181,6 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     EventStore store(options.trace ? ProbeLevel::full : ProbeLevel::counters);
     const auto metrics = open_metrics(options, store);
     if (!metrics) return metrics.error();
-    if (state->settings.wire != WireFormat::exact)
-        log_note(fmt::format("With --wire {} light loses bits on its way: this image is not reproducible.",
-                             name_of(state->settings.wire)));
     const auto shared_scene = std::make_shared<const Scene>(std::move(*scene));
     auto session =
         ClientSession::create(complete_config(options),
@@ -202,9 +205,9 @@ Result<void> run_render(const RenderOptions& options, const std::atomic<bool>& i
     buffers.samples = settings.spp > 0 ? work.indirect().samples() : work.direct().samples();
     SaveOptions save;
     save.tone_map.exposure_ev = options.exposure_ev.value_or(opened->file.exposure_ev);
-    figures.reproducible = (*session)->differing_rounds() == 0;
+    const std::string why = why_not_reproducible((*session)->differing_rounds(), settings.wire, work);
+    figures.reproducible = why.empty();
     if (!figures.reproducible) {
-        const std::string why = differing_bits((*session)->differing_rounds(), work);
         log_warning("The image is not reproducible: " + why);
         save.metadata.emplace("not_reproducible", why);
     }

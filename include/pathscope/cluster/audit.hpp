@@ -22,6 +22,7 @@
 /// No clock: `now` is an argument and never falls.   Thread safety: one thread at a time.
 /// Test: tests/cluster/test_audit.cpp, tests/session/test_simulation.cpp, tests/system/test_audit.py
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -66,8 +67,10 @@ class Audit {
 
     // -- The second opinion of a server ---------------------------------------------------------------------
 
-    /// A round that waits for a second opinion, and is not this server's own.
-    [[nodiscard]] std::optional<AuditedRound> next_for(ServerId server) const;
+    /// A round that waits for a second opinion, and is not this server's own. may_judge: whether it is another's than this
+    /// author's, who may be there under several numbers; nothing = each number is another's.
+    [[nodiscard]] std::optional<AuditedRound> next_for(
+        ServerId server, const std::function<bool(ServerId author)>& may_judge = {}) const;
     /// Requires: a round of next_for(lease.server).
     void grant(const AuditedRound& item, const Lease& lease);
     /// Whether that is an outstanding lease of an audit, and a result of it.
@@ -85,7 +88,8 @@ class Audit {
 
     // -- The client's own -----------------------------------------------------------------------------------
 
-    /// A round that only the client can settle: a disputed one, one that servers did not get done, or of an author beside whom `nobody_else` is there.
+    /// A round that only the client can settle: a disputed one, one that servers did not get done, or of an author beside
+    /// whom `nobody_else` is there.
     [[nodiscard]] std::optional<AuditedRound> next_for_client(
         const std::function<bool(ServerId)>& nobody_else) const;
     void grant_to_client(RoundKey round);
@@ -101,6 +105,13 @@ class Audit {
     // -- View -----------------------------------------------------------------------------------------------
     [[nodiscard]] bool settled() const { return items_.empty(); }
     [[nodiscard]] std::size_t unsettled() const { return items_.size(); }
+    [[nodiscard]] std::size_t outstanding() const { return leases_.size(); }  ///< Leases.
+    /// Whether an opinion of this server is before the client.
+    [[nodiscard]] bool disputes(ServerId server) const {
+        return std::any_of(items_.begin(), items_.end(), [server](const auto& entry) {
+            return entry.second.opinion && entry.second.opinion->first == server;
+        });
+    }
 
   private:
     struct Item {

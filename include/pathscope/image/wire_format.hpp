@@ -16,7 +16,7 @@
 ///
 /// An image of rounded sums depends on how its samples were grouped into rounds and on who rendered what, so it is not
 /// reproducible; and light that is a thousand times dimmer than a pixel's brightest channel is gone with `shared`.
-/// Layout: docs/protocol.md, section 5.5.
+/// Layout: docs/protocol.md, section 5.6.
 /// Source: IEEE 754 binary16; EXT_texture_shared_exponent.
 /// Thread safety: pure.   Test: tests/image/test_wire_format.cpp
 

@@ -36,7 +36,7 @@ void put_block_result(message::Tile& tile, std::span<const PixelSum> sums, WireF
 
 /// One sum for each pixel that the lease names, whatever the tile says. After an error `sums` may hold anything; the
 /// sentence names what does not fit. Into memory of the caller's, since a client reads tens of thousands in a second.
-/// A tile that lost bits is refused unless its format is the one that was agreed on.
+/// A tile that lost bits is refused unless its format is the one that was agreed on; one that did not loses them here.
 [[nodiscard]] Result<void> read_block_result(const message::Tile& tile, std::span<PixelSum> sums,
                                              WireFormat agreed = WireFormat::exact);
 

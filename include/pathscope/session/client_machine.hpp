@@ -142,7 +142,8 @@ class ClientMachine {
         TokenBucket allowance{};             ///< Of messages.
         Credits credits{0};
         SpeedEstimate speed{};
-        Turnaround turnaround{};
+        Turnaround turnaround{};  ///< Of leases since `moved`.
+        TimeNs moved = 0;         ///< When it was stuck last: what it held then says nothing of its speed.
         TimeNs next_ping = 0;
         bool asks = false;  ///< Is in asking_.
         bool same_bits = true;
@@ -244,7 +245,8 @@ class ClientMachine {
     // client_audit.cpp: a second opinion.
     void note_merged(LightPart part, const ResultClaim& claim, const RoundResult& result,
                      std::span<const PixelSum> sums);
-    std::optional<Lease> grant_audit(ServerId server, TimeNs duration);
+    [[nodiscard]] std::optional<AuditedRound> next_audit(const Server& server) const;
+    Lease grant_audit(const AuditedRound& item, ServerId server, TimeNs duration);
     [[nodiscard]] std::optional<AuditedRound> next_local_audit(bool disputes_only) const;
     void on_opinion(const ResultClaim& claim, std::span<const PixelSum> sums);
     [[nodiscard]] Digest hash_as_sent(std::vector<PixelSum> sums, std::uint32_t samples) const;
@@ -287,6 +289,7 @@ class ClientMachine {
     Audit audit_;
     Contributions gave_direct_, gave_indirect_;  ///< In this epoch, if audits are asked for.
     std::map<ServerId, Author> authors_;         ///< Those that live, or gave something in this epoch.
+    LeaseId last_undone_{};                      ///< Rounds of leases up to it may have been undone.
     FrameWork work_;
     std::vector<PixelSum> arrived_;  ///< Of the tile at hand: its memory serves for all.
     std::uint64_t last_ticket_ = 0;

@@ -47,8 +47,7 @@ struct RunFigures {
     std::optional<double> estimated_error;  ///< Relative; nothing when it was not asked for.
     SamplesPerPixel samples_per_pixel;      ///< As the layer `spp` has them.
     std::uint64_t saturated = 0;
-    bool reproducible = true;  ///< Every round came from a program of the client's bits. A lossy wire format
-                               ///< spoils it too.
+    bool reproducible = true;  ///< Another run gives the same bits: no server of other bits, no lossy wire.
     std::vector<DroppedSample> dropped;  ///< Some of those counted as nonfinite_dropped.
     std::optional<WorkHistory> resumed;  ///< What earlier runs had done, if this one went on from them.
 };
