@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "pathscope/core/log.hpp"
 
@@ -74,13 +75,22 @@ void ClientMachine::on_connection_lost(TimeNs now) {
     next_probe_ = now_;
 }
 
-/// Who cannot be reached has no connection any more.
+/// Who cannot be reached twice has no connection any more. Why twice: a server that leaves says so and hangs up, and what it
+/// said is read between the two.
 void ClientMachine::probe_connections() {
     --probes_left_;
     next_probe_ = now_ + (k_first_probe_pause << (k_probes - 1 - probes_left_));
     std::vector<std::string> unreachable;
-    for (auto& [instance, server] : servers_)
-        if (!ping(server)) unreachable.push_back(instance);
+    for (auto& [instance, server] : servers_) {
+        const bool was_unreachable = std::exchange(server.unreachable, !ping(server));
+        if (!server.unreachable) continue;
+        if (was_unreachable) {
+            unreachable.push_back(instance);
+        } else {
+            probes_left_ = std::max(probes_left_, 1);
+            next_probe_ = now_ + k_first_probe_pause;
+        }
+    }
     for (const std::string& instance : unreachable)
         lose(instance, PeerCause::lost, "Its connection is gone.");
 }

@@ -147,6 +147,7 @@ class ClientMachine {
         TimeNs next_ping = 0;
         bool asks = false;  ///< Is in asking_.
         bool same_bits = true;
+        bool unreachable = false;  ///< When its connection was probed last.
 
         [[nodiscard]] bool stays() const {
             return peer.alive() && peer.state() != PeerState::draining && peer.state() != PeerState::stuck;
