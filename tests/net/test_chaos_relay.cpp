@@ -1,3 +1,4 @@
+#include <algorithm>
 #include "pathscope/net/chaos_relay.hpp"
 
 #include <arpa/inet.h>
@@ -370,7 +371,7 @@ TEST_CASE("a slow reader slows the writer") {
     const Plain dialler = bench.dialled(), target = bench.target.accepted();
     const std::string part = pattern(1 << 16);
     std::size_t sent = 0, received = 0;
-    // In lock step: the writer writes until it is stopped, the reader takes 256 KiB. So the writer is never
+    // In lock step: the writer writes until it is stopped, the reader takes up to 256 KiB. So the writer is never
     // further ahead than all buffers on the way hold.
     while (received < 8 * k_slack) {
         while (sent <= received + k_slack) {
@@ -378,9 +379,10 @@ TEST_CASE("a slow reader slows the writer") {
             sent += dialler.send_some(part);
         }
         REQUIRE(sent <= received + k_slack);
-        const std::size_t got = target.receive(256 << 10).size();
-        REQUIRE(got == 256 << 10);
-        received += got;
+        // The writer may have stopped for a relay that had no time: then less than that is on its way.
+        const std::size_t due = std::min<std::size_t>(256 << 10, sent - received);
+        REQUIRE(target.receive(due).size() == due);
+        received += due;
     }
     CHECK(bench.link().directions[0].most_held_bytes <= k_buffer);
 }
