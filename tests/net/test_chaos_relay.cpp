@@ -1,4 +1,3 @@
-#include <algorithm>
 #include "pathscope/net/chaos_relay.hpp"
 
 #include <arpa/inet.h>
@@ -9,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <functional>
 #include <string>
