@@ -6,11 +6,12 @@ out, and the image has the same bits as the render without servers.
 import json
 import os
 import pathlib
-import socket
 import subprocess
 import sys
 import tempfile
 import unittest
+
+from processes import free_ports
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 LIAR = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -18,16 +19,6 @@ SCENE = "scenes/cornell/scene.json"
 WIDTH, HEIGHT, SPP, DIRECT_SPP = 160, 120, 16, 8
 JOB = ["--size", f"{WIDTH}x{HEIGHT}", "--spp", str(SPP), "--direct-spp", str(DIRECT_SPP), "--seed", "7"]
 PATIENCE_S = 300
-
-
-def free_ports():
-    sockets = [socket.socket() for _ in range(3)]
-    for one in sockets:
-        one.bind(("127.0.0.1", 0))
-    ports = ",".join(str(one.getsockname()[1]) for one in sockets)
-    for one in sockets:
-        one.close()
-    return ports
 
 
 class Audit(unittest.TestCase):

@@ -14,18 +14,12 @@ import sys
 import tempfile
 import unittest
 
+from processes import free_ports
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 JOB = ["--size", "160x120", "--spp", "64", "--direct-spp", "4", "--seed", "7"]
 PATIENCE_S = 300  # A run that takes longer has failed.
-
-
-def free_ports(count):
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [str(taken.getsockname()[1]) for taken in sockets]
-    for taken in sockets:
-        taken.close()
-    return ",".join(ports)
 
 
 class Chaos:
@@ -77,7 +71,7 @@ class Cluster(unittest.TestCase):
 
     def render_through(self, schedule, servers=2, speed_cap=400_000):
         """Servers are slowed down, so that the faults come while they work, on any machine."""
-        ports = free_ports(3)
+        ports = free_ports()
         render = self.start_render("--listen", "127.0.0.1", "--ports", ports, "--min-servers", "1")
         chaos = Chaos(self.folder, ports, schedule)
         server_processes = [

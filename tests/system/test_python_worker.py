@@ -8,7 +8,6 @@ import json
 import os
 import pathlib
 import signal
-import socket
 import struct
 import subprocess
 import sys
@@ -16,18 +15,12 @@ import tempfile
 import time
 import unittest
 
+from processes import free_ports
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 WIDTH, HEIGHT, SPP, BLOCK = 100, 70, 32, 32
 PATIENCE_S = 60  # What takes longer has failed.
-
-
-def free_ports():
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
-    ports = ",".join(str(taken.getsockname()[1]) for taken in sockets)
-    for taken in sockets:
-        taken.close()
-    return ports
 
 
 def read_pfm(path):

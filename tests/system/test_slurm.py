@@ -9,7 +9,6 @@ import os
 import pathlib
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -17,6 +16,7 @@ import time
 import unittest
 import urllib.request
 
+from processes import free_ports
 from small_slurm import CannotBeHad, SmallSlurm
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -26,14 +26,6 @@ JOB = ["--size", "64x48", "--spp", "24", "--direct-spp", "1", "--seed", "7", "--
 SPEED_CAP = 64  # Samples per second: the frame would take 16 servers over a minute, a round 2 s. A quick one ends it.
 SERVERS = 16
 PATIENCE_S = 120  # What takes longer has failed.
-
-
-def free_ports():
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
-    ports = ",".join(str(taken.getsockname()[1]) for taken in sockets)
-    for taken in sockets:
-        taken.close()
-    return ports
 
 
 class Slurm(unittest.TestCase):
