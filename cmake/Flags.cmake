@@ -26,6 +26,11 @@ if(PATHSCOPE_SANITIZE)
     set_source_files_properties(src/image/stb.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=nonnull-attribute)
 endif()
 
+# Compiled together (cmake/Together.cmake), a file's own types look to GCC like a header's.
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(pathscope_flags INTERFACE -Wno-subobject-linkage)
+endif()
+
 # libFuzzer: the libraries tell it which branches are taken; its main is linked to the targets alone (cmake/Modules.cmake).
 option(PATHSCOPE_FUZZ "Build the fuzz targets; needs clang" OFF)
 if(PATHSCOPE_FUZZ)

@@ -1,9 +1,14 @@
-#pragma once
 /// doctest for our tests. Include it last, in a block of its own: doctest's CHECK then takes the place of
 /// ours (core/check.hpp), which the headers above have used already.
+/// That part has no include guard: where test files are compiled together, each begins with our CHECK.
 
 #undef CHECK
 #include <doctest/doctest.h>
+#undef CHECK
+#define CHECK(...) DOCTEST_CHECK(__VA_ARGS__)
+
+#ifndef PATHSCOPE_TESTS_TESTING_HPP
+#define PATHSCOPE_TESTS_TESTING_HPP
 
 #include <filesystem>
 
@@ -27,3 +32,5 @@ inline std::filesystem::path shared_folder() {
 }
 
 }  // namespace pathscope::testing
+
+#endif

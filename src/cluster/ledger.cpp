@@ -28,11 +28,14 @@ UnitReason reason_of(Verdict refusal) {
 
 }  // namespace
 
-SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round) {
-    CHECK(round.index < plan.rounds_of(round.unit), round.index, plan.samples, plan.round_samples);
-    const std::uint32_t size = plan.round_samples_of(round.unit);
-    const std::uint32_t first = round.index * size;
-    return {plan.first_sample(round.unit) + first, std::min(size, plan.samples - first)};
+SampleRange samples_of(const LedgerPlan& plan, const RoundRun& run) {
+    const auto [unit, index] = run.first;
+    const std::uint32_t in_all = plan.rounds_of(unit);
+    CHECK(run.rounds > 0 && index < in_all && run.rounds <= in_all - index, index, run.rounds, in_all);
+    const std::uint32_t size = plan.round_samples_of(unit);
+    const std::uint32_t first = index * size;
+    // The product fits: it is at most that of a round more than all samples.
+    return {plan.first_sample(unit) + first, std::min(run.rounds * size, plan.samples - first)};
 }
 
 // -- Epochs and checkpoints ---------------------------------------------------------------------------------
@@ -54,11 +57,12 @@ std::vector<Lease> Ledger::new_epoch(const LedgerPlan& plan, TimeNs now) {
     active_.clear();
     records_.clear();
     deadlines_.clear();
+    uncopied_.clear();
     held_.clear();
     reopened_.clear();
     outstanding_ = 0;
     committed_ = begun_ = restored_ = 0;
-    accepted_before_ = counts_.accepted;
+    accepted_before_ = counts_.rounds_accepted;
     undone_before_ = counts_.undone;
     last_lease_before_ = last_lease_;
     if (!plan.open_ended()) count(Counter::rounds, rounds(), k_local_server);
@@ -75,8 +79,7 @@ void Ledger::open(std::uint32_t unit, std::uint32_t rounds) {
 
 std::uint32_t Ledger::samples_before(std::uint32_t unit, std::uint32_t rounds) const {
     if (rounds == 0) return 0;
-    const SampleRange last = samples_of_round(plan_, {unit, rounds - 1});
-    return last.first + last.count - plan_.first_sample(unit);
+    return samples_of(plan_, RoundRun({unit, 0}, rounds)).count;
 }
 
 Result<void> Ledger::restore(std::uint32_t unit, const UnitSnapshot& snapshot) {
@@ -138,81 +141,105 @@ std::size_t Ledger::undo(std::uint32_t unit, const UnitSnapshot& kept, TimeNs no
 
 // -- Granting -----------------------------------------------------------------------------------------------
 
-std::optional<Lease> Ledger::grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration) {
-    if (stopped_ || round.unit >= plan_.units) return std::nullopt;
-    Unit& unit = units_[round.unit];
-    if (round.index == unit.fresh && round.index < unit.open) {
-        ++unit.fresh;
-        ++begun_;
-        if (plan_.open_ended()) count(Counter::rounds, 1, k_local_server);
-        return hold(active_[round], server, round, now, duration, UnitReason::fresh);
+RoundRun Ledger::grantable(RoundKey first, std::uint32_t most) const {
+    if (stopped_ || first.unit >= plan_.units) return RoundRun(first, 0);
+    const Unit& unit = units_[first.unit];
+    if (first.index >= unit.fresh)
+        return RoundRun(first, first.index == unit.fresh ? std::min(most, unit.open - unit.fresh) : 0);
+    RoundRun run(first, 0);
+    ServerId last_holder;
+    for (auto it = active_.find(first); run.rounds < most && it != active_.end(); ++it) {
+        if (run.rounds == 0) last_holder = it->second.last_holder;
+        const bool follows = it->first == run.at(run.rounds);
+        if (!follows || it->second.holders > 0 || it->second.last_holder != last_holder) break;
+        ++run.rounds;
+    }
+    return run;
+}
+
+std::optional<Lease> Ledger::grant(ServerId server, const RoundRun& run, TimeNs now, TimeNs duration) {
+    if (run.rounds == 0 || grantable(run.first, run.rounds).rounds < run.rounds) return std::nullopt;
+    Unit& unit = units_[run.first.unit];
+    if (run.first.index == unit.fresh) {
+        unit.fresh += run.rounds;
+        begun_ += run.rounds;
+        if (plan_.open_ended()) count(Counter::rounds, run.rounds, k_local_server);
+        return hold(server, run, now, duration, UnitReason::fresh);
     }
 
-    const auto found = active_.find(round);
-    if (found == active_.end() || found->second.holders > 0) return std::nullopt;
-    Active& active = found->second;
-    close_again(round);
-    if (active.attempts == 0) return hold(active, server, round, now, duration, UnitReason::fresh);
-    const bool moved = active.last_holder != server;
+    for (std::uint32_t i = 0; i < run.rounds; ++i) close_again(run.at(i));
+    const Active& first = active_.at(run.first);
+    if (first.attempts == 0) return hold(server, run, now, duration, UnitReason::fresh);
+    const bool moved = first.last_holder != server;
     if (moved) {
         ++counts_.reallocated;
         count(Counter::reallocated, 1, server);
     }
-    return hold(active, server, round, now, duration, moved ? UnitReason::reallocated : UnitReason::retried);
+    return hold(server, run, now, duration, moved ? UnitReason::reallocated : UnitReason::retried);
 }
 
 std::optional<Lease> Ledger::grant_copy(ServerId server, RoundKey round, TimeNs now, TimeNs duration) {
     const auto found = active_.find(round);
     if (stopped_ || found == active_.end()) return std::nullopt;
-    Active& active = found->second;
+    const Active& active = found->second;
     if (active.holders == 0 || active.holders >= k_holders_per_round) return std::nullopt;
-    for (const LeaseId id : active.leases) {
-        const Record& record = records_.at(id);
-        if (record.outstanding && record.lease.server == server) return std::nullopt;
-    }
+    const Lease* held = nullptr;
+    for (const LeaseId id : active.leases)
+        if (const Record& record = records_.at(id); record.outstanding) held = &record.lease;
+    if (held->server == server) return std::nullopt;
     ++counts_.copied;
     count(Counter::speculated, 1, server);
-    return hold(active, server, round, now, duration, UnitReason::straggler);
+    return hold(server, rounds_of(*held), now, duration, UnitReason::straggler);
 }
 
-Lease Ledger::hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration,
-                   UnitReason reason) {
+Lease Ledger::hold(ServerId server, const RoundRun& run, TimeNs now, TimeNs duration, UnitReason reason) {
     CHECK(duration > 0, duration);
-    if (active.leases.size() == k_leases_per_round) forget_one_ended(active);
     const bool copy = reason == UnitReason::straggler;
-    const SampleRange samples = samples_of_round(plan_, round);
-    const Lease lease{
-        LeaseId{++last_lease_}, plan_.epoch, round.unit, samples.first, samples.count, server, now,
-        now + duration,         copy};
+    const auto [unit, index] = run.first;
+    const SampleRange samples = samples_of(plan_, run);
+    const Lease lease{LeaseId{++last_lease_}, plan_.epoch, unit, samples.first, samples.count, server, now,
+                      now + duration,         copy};
+    const ServerId previous = active_[run.first].last_holder;
+    for (std::uint32_t i = 0; i < run.rounds; ++i) {
+        Active& active = active_[run.at(i)];
+        if (active.leases.size() == k_leases_per_round) forget_one_ended(active);
+        active.leases.push_back(lease.id);
+        ++active.attempts;
+        ++active.holders;
+        active.last_holder = server;
+    }
     records_.emplace(lease.id, Record{lease});
     deadlines_.emplace(lease.deadline, lease.id);
     ++held_[server];
     ++outstanding_;
     ++counts_.granted;
     count(Counter::leases_granted, 1, server);
-    note(lease, copy ? UnitChange::copied : UnitChange::granted, reason, now, active.last_holder);
-
-    active.leases.push_back(lease.id);
-    ++active.attempts;
-    ++active.holders;
-    active.last_holder = server;
-    units_[round.unit].owner = server;
+    note_holders(active_.at(run.first));
+    note(lease, copy ? UnitChange::copied : UnitChange::granted, reason, now, previous);
+    units_[unit].owner = server;
     return lease;
 }
 
 // The oldest lease has computed longest, so that its result is the likeliest to come; that of a lost server
 // is the least likely.
-void Ledger::forget_one_ended(Active& active) {
-    auto victim = active.leases.end();
-    for (auto it = active.leases.begin(); it != active.leases.end(); ++it) {
-        const Record& record = records_.at(*it);
+void Ledger::forget_one_ended(const Active& active) {
+    std::optional<LeaseId> victim;
+    for (const LeaseId id : active.leases) {
+        const Record& record = records_.at(id);
         if (record.outstanding) continue;
-        victim = it;
+        victim = id;
         if (record.revoked) break;
     }
-    CHECK(victim != active.leases.end());
-    records_.erase(*victim);
-    active.leases.erase(victim);
+    CHECK(victim);
+    forget(*victim);
+}
+
+/// Its result would be unknown from here on, or a duplicate.
+void Ledger::forget(LeaseId lease) {
+    const auto found = records_.find(lease);
+    const RoundRun run = rounds_of(found->second.lease);
+    for (std::uint32_t i = 0; i < run.rounds; ++i) std::erase(active_.at(run.at(i)).leases, lease);
+    records_.erase(found);
 }
 
 // -- Results ------------------------------------------------------------------------------------------------
@@ -227,15 +254,16 @@ Verdict Ledger::judge(const ResultClaim& claim) const {
     if (const auto found = records_.find(claim.lease); found != records_.end())
         return claim == claim_of(found->second.lease) ? Verdict::accepted : Verdict::mismatched;
 
-    const RoundKey round = round_at(claim.unit, claim.first);
-    if (round.unit >= plan_.units || round.index >= units_[round.unit].open ||
-        samples_of_round(plan_, round) != SampleRange{claim.first, claim.count})
-        return Verdict::mismatched;
-    return committed(round) ? Verdict::duplicate : Verdict::unknown;
+    const auto run = rounds_in(claim.unit, {claim.first, claim.count});
+    if (!run || run->first.index + run->rounds > units_[claim.unit].open) return Verdict::mismatched;
+    const std::uint32_t fresh = units_[claim.unit].fresh;  // From there on none is committed.
+    for (std::uint32_t i = 0; i < run->rounds && run->at(i).index < fresh; ++i)
+        if (committed(run->at(i))) return Verdict::duplicate;
+    return Verdict::unknown;
 }
 
 Commit Ledger::commit(const ResultClaim& claim, TimeNs now) {
-    Commit commit{judge(claim), false, 0, {}};
+    Commit commit{judge(claim), false, 0, 0, {}};
     ++counts_.received;
     if (commit.verdict != Verdict::accepted) {
         refuse(commit.verdict, claim, now);
@@ -244,35 +272,65 @@ Commit Ledger::commit(const ResultClaim& claim, TimeNs now) {
 
     Record& record = records_.at(claim.lease);
     const Lease lease = record.lease;
-    const RoundKey round = key_of(lease);
-    Active& active = active_.at(round);
-    if (active.holders == 0) close_again(round);
+    const RoundRun run = rounds_of(lease);
     commit.late = !record.outstanding;
     commit.since_grant = now - lease.granted;
+    commit.rounds = run.rounds;
+    for (std::uint32_t i = 0; i < run.rounds; ++i)
+        if (active_.at(run.at(i)).holders == 0) close_again(run.at(i));
     if (commit.late) {
         ++counts_.late;
     } else {
         ++counts_.returned;
         end(record);
     }
-    for (const LeaseId id : active.leases) {
-        Record& other = records_.at(id);
-        if (!other.outstanding) continue;
-        ++counts_.superseded;
-        end(other);
-        note(other.lease, UnitChange::closed, UnitReason::superseded, now);
-        commit.superseded.push_back(other.lease);
-    }
-    // Without a record the round counts as committed from here on.
-    for (const LeaseId id : active.leases) records_.erase(id);
-    active_.erase(round);
+    for (const LeaseId other : others_beside(lease, run)) supersede(other, run, commit, now);
+    // Without a record the rounds count as committed from here on.
+    forget(lease.id);
+    for (std::uint32_t i = 0; i < run.rounds; ++i) active_.erase(run.at(i));
 
-    ++committed_;
+    committed_ += run.rounds;
     units_[lease.unit].samples += lease.count;
     ++counts_.accepted;
+    counts_.rounds_accepted += run.rounds;
     note(lease, UnitChange::committed, commit.late ? UnitReason::late_result : UnitReason::result, now);
-    count(Counter::rounds_committed, 1, lease.server);
+    count(Counter::rounds_committed, run.rounds, lease.server);
     return commit;
+}
+
+/// Other leases of any of these rounds, each once.
+std::vector<LeaseId> Ledger::others_beside(const Lease& lease, const RoundRun& run) const {
+    std::vector<LeaseId> others;
+    for (std::uint32_t i = 0; i < run.rounds; ++i)
+        for (const LeaseId id : active_.at(run.at(i)).leases)
+            if (id != lease.id) others.push_back(id);
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    return others;
+}
+
+/// A lease that another's result overtook. What it holds beyond that result's rounds, which can be only if that one was
+/// late, has to be granted again: its own result, of all its rounds, is of no use.
+void Ledger::supersede(LeaseId id, const RoundRun& by, Commit& commit, TimeNs now) {
+    Record& record = records_.at(id);
+    const Lease lease = record.lease;
+    const RoundRun run = rounds_of(lease);
+    const bool was_outstanding = record.outstanding;
+    if (was_outstanding) {
+        ++counts_.superseded;
+        end(record);
+        note(lease, UnitChange::closed, UnitReason::superseded, now);
+        commit.superseded.push_back(lease);
+    }
+    forget(id);
+    for (std::uint32_t i = 0; was_outstanding && i < run.rounds; ++i) {
+        const RoundKey round = run.at(i);
+        if (by.contains(round) || active_.at(round).holders > 0) continue;
+        reopened_.push_back(round);
+        const SampleRange samples = samples_of_round(plan_, round);
+        note({{}, plan_.epoch, round.unit, samples.first, samples.count, {}, now, now}, UnitChange::reopened,
+             UnitReason::superseded, now);
+    }
 }
 
 void Ledger::refuse(Verdict verdict, const ResultClaim& claim, TimeNs now) {
@@ -333,9 +391,7 @@ std::optional<Lease> Ledger::release(LeaseId id, ServerId server, TimeNs now) {
     const Lease lease = found->second.lease;
     end_without_result(found->second, UnitReason::released, now);
     ++counts_.released;
-    // It said that no result will come, so that there is nothing to wait for.
-    std::erase(active_.at(key_of(lease)).leases, id);
-    records_.erase(found);
+    forget(id);  // It said that no result will come, so that there is nothing to wait for.
     return lease;
 }
 
@@ -345,14 +401,26 @@ void Ledger::end(Record& record) {
     const auto held = held_.find(record.lease.server);
     if (--held->second == 0) held_.erase(held);
     --outstanding_;
-    --active_.at(key_of(record.lease)).holders;
+    uncopied_.erase(record.lease.id);
+    const RoundRun run = rounds_of(record.lease);
+    for (std::uint32_t i = 0; i < run.rounds; ++i) --active_.at(run.at(i)).holders;
+    note_holders(active_.at(run.first));
+}
+
+/// The first round of a lease has got a holder, or lost one, as have the others: which of its leases may be copied?
+void Ledger::note_holders(const Active& active) {
+    for (const LeaseId id : active.leases)
+        if (records_.at(id).outstanding && active.holders == 1)
+            uncopied_.insert(id);
+        else
+            uncopied_.erase(id);
 }
 
 void Ledger::end_without_result(Record& record, UnitReason reason, TimeNs now) {
     end(record);
-    const RoundKey round = key_of(record.lease);
-    const bool reopens = active_.at(round).holders == 0;
-    if (reopens) reopened_.push_back(round);
+    const RoundRun run = rounds_of(record.lease);
+    const bool reopens = active_.at(run.first).holders == 0;  // Else all of them have the same other holder.
+    for (std::uint32_t i = 0; reopens && i < run.rounds; ++i) reopened_.push_back(run.at(i));
     note(record.lease, reopens ? UnitChange::reopened : UnitChange::closed, reason, now);
 }
 
@@ -364,6 +432,21 @@ void Ledger::close_again(RoundKey round) {
 }
 
 // -- View ---------------------------------------------------------------------------------------------------
+
+std::optional<RoundRun> Ledger::rounds_in(std::uint32_t unit, SampleRange samples) const {
+    if (unit >= plan_.units || samples.count == 0) return std::nullopt;
+    const std::uint32_t size = plan_.round_samples_of(unit);
+    const RoundRun run(round_at(unit, samples.first), (samples.count - 1) / size + 1);
+    const std::uint32_t in_all = plan_.rounds_of(unit);
+    if (run.first.index >= in_all || run.rounds > in_all - run.first.index) return std::nullopt;
+    return samples_of(plan_, run) == samples ? std::optional(run) : std::nullopt;
+}
+
+RoundRun Ledger::rounds_of(const Lease& lease) const {
+    const auto run = rounds_in(lease.unit, {lease.first, lease.count});
+    CHECK(run, lease.unit, lease.first, lease.count);
+    return *run;
+}
 
 bool Ledger::committed(RoundKey round) const {
     return round.index < units_[round.unit].fresh && !active_.contains(round);
@@ -399,10 +482,8 @@ std::size_t Ledger::outstanding(ServerId server) const {
 }
 
 std::optional<Lease> Ledger::oldest_uncopied(ServerId not_of) const {
-    for (const auto& [id, record] : records_)
-        if (record.outstanding && record.lease.server != not_of &&
-            active_.at(key_of(record.lease)).holders == 1)
-            return record.lease;
+    for (const LeaseId id : uncopied_)
+        if (const Lease& lease = records_.at(id).lease; lease.server != not_of) return lease;
     return std::nullopt;
 }
 
@@ -439,23 +520,35 @@ Result<void> Ledger::audit_balances() const {
     if (c.accepted != c.returned + c.late)
         return failed(fmt::format("Ledger: {} results were accepted, but {} came in time and {} late.",
                                   c.accepted, c.returned, c.late));
-    const std::uint64_t booked = c.accepted - accepted_before_ + restored_ - (c.undone - undone_before_);
+    const std::uint64_t booked =
+        c.rounds_accepted - accepted_before_ + restored_ - (c.undone - undone_before_);
     if (committed_ != booked)
         return failed(
-            fmt::format("Ledger: {} rounds are committed, but {} results were booked.", committed_, booked));
+            fmt::format("Ledger: {} rounds are committed, but those of results are {}.", committed_, booked));
     return {};
 }
 
 Result<void> Ledger::audit_records() const {
-    std::size_t known = 0, holders = 0, open = 0;
+    std::size_t known = 0, holders = 0, open = 0, alone = 0;
     for (const auto& [round, active] : active_) {
         std::size_t outstanding = 0;
+        std::optional<RoundRun> held;
         for (const LeaseId id : active.leases) {
             const auto record = records_.find(id);
-            if (record == records_.end() || key_of(record->second.lease) != round)
+            if (record == records_.end() || !rounds_of(record->second.lease).contains(round))
                 return failed(
                     fmt::format("Ledger: lease {} of unit {} has no record.", id.value, round.unit));
-            outstanding += record->second.outstanding ? 1 : 0;
+            if (!record->second.outstanding) continue;
+            ++outstanding;
+            const RoundRun run = rounds_of(record->second.lease);
+            if (held && (held->first != run.first || held->rounds != run.rounds))
+                return failed(
+                    fmt::format("Ledger: outstanding leases of unit {} overlap in part.", round.unit));
+            held = run;
+            if (uncopied_.contains(id) != (active.holders == 1))
+                return failed(fmt::format("Ledger: lease {} of {} holders is {}copied.", id.value,
+                                          active.holders, uncopied_.contains(id) ? "un" : ""));
+            alone += active.holders == 1 && run.first == round ? 1 : 0;
         }
         if (outstanding != active.holders || active.holders > k_holders_per_round ||
             active.leases.size() > k_leases_per_round)
@@ -470,14 +563,24 @@ Result<void> Ledger::audit_records() const {
         holders += active.holders;
         open += active.holders == 0 ? 1 : 0;
     }
-    std::size_t held = 0;
+    if (uncopied_.size() != alone)
+        return failed(
+            fmt::format("Ledger: {} leases have one holder, {} are uncopied.", alone, uncopied_.size()));
+    std::size_t held = 0, rounds_recorded = 0, rounds_outstanding = 0;
     for (const auto& [server, leases] : held_) held += leases;
-    if (known != records_.size() || open != reopened_.size() || holders != outstanding_ ||
+    for (const auto& [id, record] : records_) {
+        const std::size_t rounds = rounds_of(record.lease).rounds;
+        rounds_recorded += rounds;
+        rounds_outstanding += record.outstanding ? rounds : 0;
+    }
+    if (known != rounds_recorded || open != reopened_.size() || holders != rounds_outstanding ||
         held != outstanding_ || deadlines_.size() != outstanding_)
-        return failed(fmt::format(
-            "Ledger: {} records for {} leases, {} waiting of {}; outstanding {}, {} held by "
-            "rounds, {} by servers, {} deadlines.",
-            records_.size(), known, reopened_.size(), open, outstanding_, holders, held, deadlines_.size()));
+        return failed(
+            fmt::format("Ledger: records of {} rounds, {} listed by them; {} waiting of {}; {} rounds "
+                        "outstanding, {} held; "
+                        "{} leases outstanding, {} held by servers, {} deadlines.",
+                        rounds_recorded, known, reopened_.size(), open, rounds_outstanding, holders,
+                        outstanding_, held, deadlines_.size()));
     return {};
 }
 

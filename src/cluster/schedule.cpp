@@ -184,13 +184,14 @@ std::optional<RoundKey> Schedule::next_of(Walk& walk, const Ledger& ledger) {
     return std::nullopt;
 }
 
-std::optional<RoundKey> pick_straggler(const Ledger& ledger, ServerId server, TimeNs now,
-                                       TimeNs own_estimate) {
+std::optional<Lease> pick_straggler(const Ledger& ledger, ServerId server, TimeNs now,
+                                    const std::function<std::optional<TimeNs>(const Lease&)>& own_estimate) {
     const std::optional<Lease> oldest = ledger.oldest_uncopied(server);
     if (!oldest || ledger.stopped()) return std::nullopt;
+    const std::optional<TimeNs> own = own_estimate(*oldest);
     const double age = static_cast<double>(now - oldest->granted);
-    if (age <= k_straggler_factor * static_cast<double>(own_estimate)) return std::nullopt;
-    return ledger.key_of(*oldest);
+    if (!own || age <= k_straggler_factor * static_cast<double>(*own)) return std::nullopt;
+    return oldest;
 }
 
 }  // namespace pathscope

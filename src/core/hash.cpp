@@ -2,40 +2,56 @@
 
 #include <sodium.h>
 
+#include <utility>
+
 #include "pathscope/core/check.hpp"
 
 namespace pathscope {
+namespace {
 
-struct Hasher::State {
-    crypto_generichash_state blake;
-};
-
-Hasher::Hasher() : state_(std::make_unique<State>()) {
-    CHECK(crypto_generichash_init(&state_->blake, nullptr, 0, Digest{}.size()) == 0);
+/// Lets libsodium look which instructions this processor has. It would else take the slowest code, which gives the same.
+void prepare() {
+    static const bool ready = sodium_init() >= 0;
+    CHECK(ready);
 }
 
-Hasher::~Hasher() = default;
+const unsigned char* bytes_of(std::span<const std::byte> bytes) {
+    return reinterpret_cast<const unsigned char*>(bytes.data());
+}
+
+template <class State>
+crypto_generichash_state* blake(State& state) {
+    static_assert(sizeof(State) == sizeof(crypto_generichash_state));
+    static_assert(alignof(State) >= alignof(crypto_generichash_state));
+    return reinterpret_cast<crypto_generichash_state*>(&state);
+}
+
+}  // namespace
+
+Hasher::Hasher() {
+    prepare();
+    CHECK(crypto_generichash_init(blake(state_), nullptr, 0, Digest{}.size()) == 0);
+}
 
 void Hasher::add(std::span<const std::byte> bytes) {
-    CHECK(state_ != nullptr);
-    crypto_generichash_update(&state_->blake, reinterpret_cast<const unsigned char*>(bytes.data()),
-                              bytes.size());
+    CHECK(!finished_);
+    crypto_generichash_update(blake(state_), bytes_of(bytes), bytes.size());
 }
 
 void Hasher::add(std::string_view text) { add(std::as_bytes(std::span(text))); }
 
 Digest Hasher::finish() {
-    CHECK(state_ != nullptr);
+    CHECK(!std::exchange(finished_, true));
     Digest digest;
-    crypto_generichash_final(&state_->blake, digest.data(), digest.size());
-    state_.reset();
+    crypto_generichash_final(blake(state_), digest.data(), digest.size());
     return digest;
 }
 
 Digest hash_bytes(std::span<const std::byte> bytes) {
-    Hasher hasher;
-    hasher.add(bytes);
-    return hasher.finish();
+    prepare();
+    Digest digest;
+    CHECK(crypto_generichash(digest.data(), digest.size(), bytes_of(bytes), bytes.size(), nullptr, 0) == 0);
+    return digest;
 }
 
 Digest hash_text(std::string_view text) { return hash_bytes(std::as_bytes(std::span(text))); }

@@ -19,7 +19,7 @@ class MetricsEndpoint::Page : public prometheus::Collectable {
     explicit Page(const EventStore& store) : store_(store) {}
 
     void publish(ClusterFigures figures, TimeNs now) {
-        const CounterTotals totals = store_.totals();
+        const CounterTotals totals = store_.totals_ever();
         const std::lock_guard lock(mutex_);
         figures_ = std::move(figures);
         rates_.add(totals, now);

@@ -23,7 +23,7 @@ MetricFamily gauge(const std::string& name, const std::string& help, double valu
 
 MetricFamily counter(std::string_view name, std::uint64_t total) {
     MetricFamily family{fmt::format("pathscope_{}_total", name),
-                        fmt::format("As '{}' of --stats.", name),
+                        fmt::format("As '{}' of --stats, with what was taken back since.", name),
                         MetricType::Counter,
                         {}};
     family.metric.emplace_back().counter.value = double(total);
@@ -72,7 +72,7 @@ MetricFamily latencies(Latency what, const std::vector<ServerSummary>& servers) 
         ClientMetric& metric = family.metric.emplace_back();
         metric.label = {{"id", std::to_string(server.id.value)}, {"name", server.name}};
         metric.summary.sample_count = latency.count;
-        metric.summary.sample_sum = double(latency.count) * latency.mean_ms * k_seconds_per_ms;
+        metric.summary.sample_sum = latency.sum_ms * k_seconds_per_ms;
         metric.summary.quantile = {{0.5, latency.p50_ms * k_seconds_per_ms},
                                    {0.95, latency.p95_ms * k_seconds_per_ms}};
     }
@@ -84,7 +84,7 @@ MetricFamily latencies(Latency what, const std::vector<ServerSummary>& servers) 
 std::vector<MetricFamily> metric_families(const EventStore& store, const ClusterFigures& figures,
                                           const CounterRates& rates) {
     std::vector<MetricFamily> families;
-    const CounterTotals totals = store.totals();
+    const CounterTotals totals = store.totals_ever();
     for (const auto& [what, name] : k_counter_names)
         families.push_back(counter(name, totals[std::size_t(what)]));
 

@@ -1,7 +1,5 @@
 #include "pathscope/metrics/rate_window.hpp"
 
-#include <algorithm>
-
 namespace pathscope {
 
 void RateWindow::add(const CounterTotals& totals, TimeNs now) {
@@ -16,8 +14,7 @@ CounterRates RateWindow::rates() const {
     const double seconds = to_seconds(last.time - first.time);
     const auto rate = [&](Counter counter) {
         const auto i = std::size_t(counter);
-        // What an audit found false is taken back from the totals.
-        return std::max(0.0, double(last.totals[i]) - double(first.totals[i])) / seconds;
+        return double(last.totals[i] - first.totals[i]) / seconds;
     };
     return {rate(Counter::rays), rate(Counter::samples), rate(Counter::tiles)};
 }

@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 #include <zmq.h>
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-
 #include <cctype>
 #include <cerrno>
 #include <cstdint>
 
 #include "context_state.hpp"
 #include "pathscope/core/check.hpp"
+#include "tcp.hpp"
 
 namespace pathscope {
 namespace {
@@ -71,11 +69,9 @@ bool reaches_other_machines(std::string_view endpoint) {
     std::string host(address.substr(0, address.rfind(':')));
     if (host == "localhost") return false;
     // By its number: the name of an interface or of a host may begin with "127." as well.
-    in_addr number{};
-    if (::inet_pton(AF_INET, host.c_str(), &number) == 1) return (ntohl(number.s_addr) >> 24) != 127;
     if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-    in6_addr wide{};
-    return ::inet_pton(AF_INET6, host.c_str(), &wide) != 1 || !IN6_IS_ADDR_LOOPBACK(&wide);
+    const auto number = tcp_address_of_digits(host);
+    return !number || !number->is_loopback();
 }
 
 }  // namespace pathscope

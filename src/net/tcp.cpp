@@ -70,6 +70,22 @@ Result<TcpAddress> resolve_tcp(const std::string& host) {
     return address;
 }
 
+std::optional<TcpAddress> tcp_address_of_digits(const std::string& host) {
+    TcpAddress address;
+    auto* const v4 = reinterpret_cast<sockaddr_in*>(&address.storage);
+    auto* const v6 = reinterpret_cast<sockaddr_in6*>(&address.storage);
+    if (::inet_pton(AF_INET, host.c_str(), &v4->sin_addr) == 1) {
+        address.storage.ss_family = AF_INET;
+        address.size = sizeof *v4;
+    } else if (::inet_pton(AF_INET6, host.c_str(), &v6->sin6_addr) == 1) {
+        address.storage.ss_family = AF_INET6;
+        address.size = sizeof *v6;
+    } else {
+        return std::nullopt;
+    }
+    return address;
+}
+
 Result<Descriptor> listen_tcp(const TcpAddress& address) {
     Descriptor socket = open_tcp(address);
     const int on = 1;

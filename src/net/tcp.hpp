@@ -7,6 +7,7 @@
 
 #include <sys/socket.h>
 
+#include <optional>
 #include <string>
 
 #include "descriptor.hpp"
@@ -26,6 +27,9 @@ struct TcpAddress {
 /// The first address of a name, or of digits as in "127.0.0.1" and "::1". May ask a name server, and wait
 /// for it.
 [[nodiscard]] Result<TcpAddress> resolve_tcp(const std::string& host);
+
+/// Of digits alone, so that no name server is asked; nothing if the host is a name.
+[[nodiscard]] std::optional<TcpAddress> tcp_address_of_digits(const std::string& host);
 
 /// Port 0: any free one; tcp_address_of() tells which.
 [[nodiscard]] Result<Descriptor> listen_tcp(const TcpAddress& address);

@@ -17,6 +17,8 @@
 namespace pathscope {
 namespace {
 
+constexpr std::size_t k_usual_frames = 4;  ///< Routing id, head, header, payload.
+
 /// Below this, copying a frame is cheaper than giving its memory away.
 constexpr std::size_t k_copy_below_bytes = 1024;
 
@@ -206,14 +208,13 @@ std::optional<Frames> receive_frames(void* socket, Origin* origin) {
     IncomingFrame incoming;
     if (!incoming.receive(socket)) return std::nullopt;
     Frames frames;
+    frames.reserve(k_usual_frames);
     frames.push_back(incoming.bytes());
-    if (origin) *origin = incoming.origin();
     // The rest of a message has arrived with its first frame.
-    while (incoming.more() && incoming.receive(socket)) {
+    while (incoming.more() && incoming.receive(socket))
         if (frames.size() < k_max_frames) frames.push_back(incoming.bytes());
-        // The routing id before a message is made here, and does not always know where the message came from.
-        if (origin && origin->descriptor < 0) *origin = incoming.origin();
-    }
+    // The routing id before a message is made here, and does not always know where the message came from; its end does.
+    if (origin) *origin = incoming.origin();
     return frames;
 }
 

@@ -11,6 +11,7 @@ LatencySummary summarise_latency(const LatencyHistogram& histogram) {
     LatencySummary summary;
     summary.count = histogram.count();
     if (summary.count == 0) return summary;
+    summary.sum_ms = to_milliseconds(histogram.sum());
     summary.mean_ms = to_milliseconds(*histogram.mean());
     summary.p50_ms = to_milliseconds(*histogram.quantile(0.50));
     summary.p95_ms = to_milliseconds(*histogram.quantile(0.95));
@@ -46,6 +47,7 @@ void EventStore::take_back(std::initializer_list<Count> counts, ServerId server)
     for (const auto& [counter, n] : counts) {
         const auto index = static_cast<std::size_t>(counter);
         totals_[index] -= n;
+        taken_back_[index] += n;
         if (of_server != nullptr) of_server->totals[index] -= n;
     }
 }
@@ -95,6 +97,13 @@ CounterTotals EventStore::totals() const {
     return totals_;
 }
 
+CounterTotals EventStore::totals_ever() const {
+    const std::lock_guard lock(mutex_);
+    CounterTotals ever = totals_;
+    for (std::size_t i = 0; i < ever.size(); ++i) ever[i] += taken_back_[i];
+    return ever;
+}
+
 std::optional<ServerSummary> EventStore::server(ServerId server) const {
     const std::lock_guard lock(mutex_);
     const auto found = servers_.find(server);
@@ -133,10 +142,14 @@ std::uint64_t EventStore::fallen_off() const {
 }
 
 EventStore::ServerTotals* EventStore::totals_of(ServerId server) {
-    const auto found = servers_.find(server);
-    if (found != servers_.end()) return &found->second;
-    if (servers_.size() >= limits_.servers) return nullptr;
-    return &servers_[server];
+    if (last_counted_ != nullptr && last_counted_->first == server) return &last_counted_->second;
+    auto found = servers_.find(server);
+    if (found == servers_.end()) {
+        if (servers_.size() >= limits_.servers) return nullptr;
+        found = servers_.try_emplace(server).first;
+    }
+    last_counted_ = &*found;
+    return &found->second;
 }
 
 ServerSummary EventStore::summarise(ServerId id, const ServerTotals& totals) {

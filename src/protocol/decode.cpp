@@ -23,6 +23,10 @@ class HeaderReader {
     void u64(std::string_view name, std::uint64_t& value, std::uint64_t least, std::uint64_t most) {
         value = fields.u64(name, least, most);
     }
+    void optional_u32(std::string_view name, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
+                      std::uint32_t absent) {
+        value = fields.has(name) ? fields.u32(name, least, most) : absent;
+    }
     void time(std::string_view name, TimeNs& value) { value = fields.i64(name, 0); }
     void text(std::string_view name, std::string& value, std::size_t least, std::size_t most) {
         value = fields.text(name, least, most);
@@ -34,7 +38,7 @@ class HeaderReader {
         value = fields.bytes(name, size, size);
     }
     void hash(std::string_view name, Digest& value) {
-        const std::string digits = fields.bytes(name, value.size(), value.size());
+        const std::string_view digits = fields.bytes(name, value.size(), value.size());
         if (digits.size() == value.size()) std::copy(digits.begin(), digits.end(), value.begin());
     }
     template <class E>

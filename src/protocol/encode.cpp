@@ -1,4 +1,5 @@
-#include <algorithm>
+#include <initializer_list>
+#include <utility>
 
 #include "fields.hpp"
 #include "pathscope/core/check.hpp"
@@ -10,62 +11,94 @@
 namespace pathscope {
 namespace {
 
-/// Visitor that fills a header. A value beyond its limits is a bug of ours, so it is a CHECK.
+/// Visitor that writes a header. A value beyond its limits is a bug of ours, so it is a CHECK.
 class HeaderWriter {
   public:
+    HeaderWriter() { fields_.reserve(k_usual_bytes); }
+
     void u32(std::string_view name, std::uint32_t value, std::uint32_t least, std::uint32_t most) {
         u64(name, value, least, most);
     }
     void u64(std::string_view name, std::uint64_t value, std::uint64_t least, std::uint64_t most) {
         CHECK(value >= least && value <= most, name, value, least, most);
-        map.set(name, value);
+        field(name).integer(value);
+    }
+    /// Left out where it says no more than its absence.
+    void optional_u32(std::string_view name, std::uint32_t value, std::uint32_t least, std::uint32_t most,
+                      std::uint32_t absent) {
+        if (value != absent) u64(name, value, least, most);
     }
     void time(std::string_view name, TimeNs value) {
         CHECK(value >= 0, name, value);
-        map.set(name, value);
+        field(name).integer(value);
     }
     void text(std::string_view name, const std::string& value, std::size_t least, std::size_t most) {
         CHECK(value.size() >= least && value.size() <= most && is_printable_utf8(value), name, value);
-        map.set(name, value);
+        field(name).text(value);
     }
     void free_text(std::string_view name, const std::string& value, std::size_t most) {
-        map.set(name, make_printable(value, most));
+        field(name).text(make_printable(value, most));
     }
     void bytes(std::string_view name, const std::string& value, std::size_t size) {
         CHECK(value.size() == size, name, value.size());
-        map.set(name, PackBytes{value});
+        field(name).bytes(value);
     }
     void hash(std::string_view name, const Digest& value) {
-        map.set(name, PackBytes{std::string(value.begin(), value.end())});
+        field(name).bytes({reinterpret_cast<const char*>(value.data()), value.size()});
     }
     template <class E>
     void word(std::string_view name, E value) {
         CHECK(from_name<E>(name_of(value)) == value, name);
-        map.set(name, name_of(value));
+        field(name).text(name_of(value));
     }
     void rect(std::string_view name, const PixelRect& r) {
         constexpr std::int64_t k_side = k_max_pixel;
         CHECK(r.x >= 0 && r.y >= 0 && !r.empty(), name, r);
         CHECK(std::int64_t{r.x} + r.width <= k_side && std::int64_t{r.y} + r.height <= k_side, name, r);
-        map.set(name, PackArray{r.x, r.y, r.width, r.height});
+        numbers_of(field(name), {r.x, r.y, r.width, r.height});
     }
     void numbers(std::string_view name, const std::vector<std::uint64_t>& values, std::size_t most) {
         CHECK(values.size() <= most, name, values.size());
-        map.set(name, PackArray(values.begin(), values.end()));
+        field(name).array(values.size());
+        for (const std::uint64_t value : values) fields_.integer(value);
     }
     void samples(std::string_view name, const std::vector<DroppedSample>& values, std::size_t most) {
         CHECK(values.size() <= most, name, values.size());
-        PackArray items;
+        field(name).array(values.size());
         for (const DroppedSample& s : values) {
             CHECK(s.x < k_max_pixel && s.y < k_max_pixel, name, s.x, s.y);
-            items.push_back(PackArray{s.x, s.y, s.sample});
+            numbers_of(fields_, {s.x, s.y, s.sample});
         }
-        map.set(name, std::move(items));
     }
     void payload(std::string& bytes) { frame = &bytes; }
 
-    PackMap map;
+    [[nodiscard]] std::string header() const {
+        PackWriter header;
+        header.reserve(k_most_map_bytes + fields_.size());
+        header.map(count_);
+        header.append(fields_);
+        return header.take();
+    }
+
     std::string* frame = nullptr;
+
+  private:
+    static constexpr std::size_t k_usual_bytes = 256;   ///< Of a header.
+    static constexpr std::size_t k_most_map_bytes = 5;  ///< Before its first key.
+
+    /// Names the next field; its value has to follow.
+    PackWriter& field(std::string_view name) {
+        ++count_;
+        fields_.text(name);
+        return fields_;
+    }
+    static void numbers_of(PackWriter& out, std::initializer_list<std::int64_t> numbers) {
+        out.array(numbers.size());
+        for (const std::int64_t number : numbers) out.integer(number);
+    }
+
+    PackWriter fields_;
+    std::size_t count_ = 0;
 };
 
 }  // namespace
@@ -89,8 +122,11 @@ Frames encode(Message message) {
             CHECK(rule.what.empty(), info.name, rule.field, rule.what);
         },
         message);
-    std::string header = pack(PackValue(std::move(writer.map)));
-    Frames frames{message_head(k_protocol_version, std::uint8_t(info.type), header), std::move(header)};
+    std::string header = writer.header();
+    Frames frames;
+    frames.reserve(3);
+    frames.push_back(message_head(k_protocol_version, std::uint8_t(info.type), header));
+    frames.push_back(std::move(header));
     if (writer.frame) {
         CHECK(writer.frame->size() <= info.max_payload_bytes, info.name, writer.frame->size());
         frames.push_back(std::move(*writer.frame));

@@ -137,6 +137,7 @@ void describe(Field& field, M& m) {
     field.time("sent_ns", m.sent_ns);
     field.u64("progress", m.progress, 0, k_max_u64);
     field.u32("queue", m.queue, 0, k_max_u32);
+    field.optional_u32("at_once", m.at_once, 1, k_max_credits, 1);
 }
 
 template <class Field, Is<message::Bye> M>

@@ -19,6 +19,10 @@ class FieldLister {
     void u64(std::string_view name, std::uint64_t, std::uint64_t least, std::uint64_t most) {
         add(name, "u64", range(least, most, k_max_u64));
     }
+    void optional_u32(std::string_view name, std::uint32_t, std::uint32_t least, std::uint32_t most,
+                      std::uint32_t absent) {
+        add(name, "u32", fmt::format("{}; absent: {}", range(least, most, k_max_u32), absent));
+    }
     void time(std::string_view name, TimeNs) { add(name, "time", "any"); }
     void text(std::string_view name, const std::string&, std::size_t least, std::size_t most) {
         add(name, "str", fmt::format("{} to {} bytes", least, most));

@@ -14,6 +14,10 @@ class LineWriter {
   public:
     void u32(std::string_view name, std::uint32_t value, std::uint32_t, std::uint32_t) { put(name, value); }
     void u64(std::string_view name, std::uint64_t value, std::uint64_t, std::uint64_t) { put(name, value); }
+    void optional_u32(std::string_view name, std::uint32_t value, std::uint32_t, std::uint32_t,
+                      std::uint32_t absent) {
+        if (value != absent) put(name, value);
+    }
     void time(std::string_view name, TimeNs value) { put(name, value); }
     void text(std::string_view name, const std::string& value, std::size_t, std::size_t most) {
         free_text(name, value, most);

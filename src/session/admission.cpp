@@ -46,4 +46,13 @@ std::optional<BitsMisfit> bits_misfit(const BitsIdentity& client, const BitsIden
         "Use a machine like the client's, or give the client --relaxed."};
 }
 
+std::optional<message::Reject> reject_bits(const std::optional<BitsMisfit>& misfit, bool relaxed,
+                                           std::optional<bool> same_before) {
+    if (misfit && !relaxed)
+        return message::Reject{misfit->code, fmt::format("{} {}", misfit->what, misfit->remedy), 0};
+    if (same_before && *same_before != !misfit)
+        return message::Reject{RejectCode::malformed, "HELLO says other bits than it said before.", 0};
+    return std::nullopt;
+}
+
 }  // namespace pathscope

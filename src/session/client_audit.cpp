@@ -13,12 +13,12 @@ namespace pathscope {
 // ---- What is to be audited, and by whom.
 
 /// Books whose work a merged result was.
-void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, const RoundResult& result,
-                                std::span<const PixelSum> sums) {
+void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, std::uint32_t rounds,
+                                const RoundResult& result, std::span<const PixelSum> sums) {
     if (!audit_.enabled()) return;
     Contributions& gave = part == LightPart::direct ? gave_direct_ : gave_indirect_;
-    gave.add(claim.unit,
-             {claim.server, 1, result.samples, result.rays, result.dropped_count, result.saturated_count});
+    gave.add(claim.unit, {claim.server, 1, rounds, result.samples, result.rays, result.dropped_count,
+                          result.saturated_count});
     if (part == LightPart::direct) return;
     const RoundKey round = work_.indirect_ledger().round_at(claim.unit, claim.first);
     const auto author = authors_.find(claim.server);
@@ -26,6 +26,10 @@ void ClientMachine::note_merged(LightPart part, const ResultClaim& claim, const 
     if (may_differ || !audit_.chosen(round)) return;
     if (audit_.on_merged({round, {claim.first, claim.count}, claim.server, hash_of_sums(sums)}))
         serve_all_ = true;  // Another server than this one may have nothing to do.
+}
+
+std::uint32_t ClientMachine::rounds_of(std::uint32_t unit, SampleRange samples) const {
+    return work_.indirect_ledger().rounds_in(unit, samples).value().rounds;
 }
 
 /// A round for a second opinion of this server. Not of servers of other bits, who may differ without a lie.
@@ -68,7 +72,9 @@ std::optional<AuditedRound> ClientMachine::next_local_audit(bool disputes_only) 
 
 void ClientMachine::on_opinion(const ResultClaim& claim, std::span<const PixelSum> sums) {
     const auto author = audit_.author_of(claim.lease);
-    if (audit_.on_opinion(claim, hash_of_sums(sums))) return store_.count(Counter::rounds_audited, 1, author);
+    if (audit_.on_opinion(claim, hash_of_sums(sums)))
+        return store_.count(Counter::rounds_audited, rounds_of(claim.unit, {claim.first, claim.count}),
+                            author);
     record(NoteEvent{LongText(fmt::format(
         "Servers {} and {} differ about samples {} to {} of unit {}; the client judges.", author.value,
         claim.server.value, claim.first, claim.first + claim.count - 1, claim.unit))});
@@ -90,8 +96,8 @@ void ClientMachine::on_own_opinion(const LocalWork& work, const RoundOutcome& ou
     if (!outcome.result) return audit_.release_client(item.round);
     const std::size_t unsettled = audit_.unsettled();
     const auto liars = audit_.on_truth(item.round, hash_as_sent(outcome.result->sums, item.samples.count));
-    // It may be that it was undone meanwhile.
-    store_.count(Counter::rounds_audited, unsettled - audit_.unsettled(), item.author);
+    if (audit_.unsettled() < unsettled)  // It may be that it was undone meanwhile.
+        store_.count(Counter::rounds_audited, rounds_of(item.round.unit, item.samples), item.author);
     std::vector<Author> convicted;  // Their names are forgotten with the epoch that the first one ends.
     for (const ServerId liar : liars) {
         store_.count(Counter::audits_differing, 1, liar);
@@ -164,7 +170,7 @@ std::uint64_t ClientMachine::take_back(const std::vector<Contribution>& gave, bo
         const auto author = authors_.find(one.server);
         const bool differs = author != authors_.end() && !author->second.same_bits;
         if (differs) differing_rounds_ -= one.rounds;
-        store_.take_back({{Counter::tiles, one.rounds},
+        store_.take_back({{Counter::tiles, one.tiles},
                           {Counter::rounds_committed, indirect ? one.rounds : 0},
                           {Counter::rays, one.rays},
                           {Counter::samples, one.samples},

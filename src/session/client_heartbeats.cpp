@@ -19,12 +19,14 @@ constexpr TimeNs k_first_probe_pause = k_millisecond_ns;
 constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
 constexpr TimeNs k_longest_pause = 50 * k_millisecond_ns;
 
+/// A server that owes nothing says CREDIT with each heartbeat.
+constexpr TimeNs k_frames_patience = 5 * k_second_ns;
+
 }  // namespace
 
 void ClientMachine::on(Server& server, message::Ping& message) {
     send(Channel::monitor, server.instance,
-         message::Pong{message.token, now_, now_, work_.indirect_ledger().rounds_committed(), 0},
-         server.peer.id());
+         message::Pong{message.token, now_, now_, indirect_.rounds_committed(), 0}, server.peer.id());
 }
 
 void ClientMachine::on(Server& server, message::Pong& message) {
@@ -34,6 +36,9 @@ void ClientMachine::on(Server& server, message::Pong& message) {
         server.round_trip = server.clock.at(now_)->rtt;
         store_.add_latency(Latency::heartbeat, *rtt, server.peer.id());
     }
+    if (message.progress > server.told_progress) ++work_seen_;  // What a peer says may be any number.
+    server.told_progress = message.progress;
+    if (std::exchange(server.at_once, message.at_once) != message.at_once) servers_changed();
     server.progress.on_heartbeat(message.progress, message.queue, now_);
     watch_progress(server);
 }
@@ -64,7 +69,7 @@ void ClientMachine::watch_progress(Server& server) {
 
 bool ClientMachine::ping(Server& server) {
     return send(Channel::monitor, server.instance,
-                message::Ping{std::uint64_t(now_), sequence_, work_.indirect_ledger().rounds_committed(), 0},
+                message::Ping{std::uint64_t(now_), sequence_, indirect_.rounds_committed(), 0},
                 server.peer.id());
 }
 
@@ -95,6 +100,17 @@ void ClientMachine::probe_connections() {
         lose(instance, PeerCause::lost, "Its connection is gone.");
 }
 
+/// A server that lives, but not on frames: there its routing id came damaged, or is taken, and it cannot know. As somebody
+/// new it will have both connections under one name again.
+void ClientMachine::watch_frames(const Server& server) {
+    const bool may_be_silent = server.peer.state() != PeerState::syncing && !server.peer.accepts_work();
+    if (may_be_silent || server.credits.limit() > 0 || server.credits.owed() > 0 ||
+        now_ - server.frames_heard < std::max(k_frames_patience, 3 * heartbeat_))
+        return;
+    if (ask_who(server.instance))
+        log_note(fmt::format("{} is not heard on the channel of frames; it is to dial again.", server.name));
+}
+
 void ClientMachine::watch_heartbeats() {
     std::vector<std::pair<std::string, std::string>> dead;
     next_look_ = now_ + k_longest_pause;
@@ -113,6 +129,7 @@ void ClientMachine::watch_heartbeats() {
             step_peer(server, PeerCause::silent,
                       fmt::format("It has been silent for {:.2f} s.", to_seconds(suspicion.silence)));
         server.credits.write_off(now_);
+        watch_frames(server);
     }
     next_look_ = std::max(next_look_, now_ + k_shortest_pause);
     for (const auto& [instance, why] : dead) lose(instance, PeerCause::lost, why);

@@ -18,18 +18,13 @@ TimeNs dead_after_of(DetectorKind kind) {
     return kind == DetectorKind::fixed ? 20 * k_second_ns : 5 * k_second_ns;
 }
 
-}  // namespace
-
-/// For good, as it is.
-std::optional<message::Reject> ClientMachine::reason_to_reject(
-    const std::string& instance, const message::Hello& hello, const std::optional<BitsMisfit>& misfit) const {
-    if (hello.instance != instance)
-        return message::Reject{RejectCode::malformed, "HELLO names another instance than its connection has.",
-                               0};
-    if (misfit && !config_.relaxed)
-        return message::Reject{misfit->code, fmt::format("{} {}", misfit->what, misfit->remedy), 0};
-    return std::nullopt;
+/// Not for good: the routing id of a connection is what no seal covers, so a bit of it may have flipped on its way. By
+/// another connection the server is welcome.
+message::Reject reject_instance() {
+    return {RejectCode::malformed, "HELLO names another instance than its connection has.", 1000};
 }
+
+}  // namespace
 
 void ClientMachine::on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender) {
     const std::string who = conduct_name(sender.key, hello.name, sender.address);
@@ -38,9 +33,10 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
                                                  ? bits_misfit(own_bits(), {hello.build, hello.golden})
                                                  : std::nullopt;
     auto found = servers_.find(instance);
-    auto reject = reason_to_reject(instance, hello, misfit);
-    if (!reject && found != servers_.end() && found->second.same_bits == misfit.has_value())
-        reject = message::Reject{RejectCode::malformed, "HELLO says other bits than it said before.", 0};
+    std::optional<bool> same_before;
+    if (found != servers_.end()) same_before = found->second.same_bits;
+    auto reject =
+        hello.instance == instance ? reject_bits(misfit, config_.relaxed, same_before) : reject_instance();
     if (reject) {
         log_warning(fmt::format("Refused the server {}: {}", hello.name, reject->text));
         const bool malformed = reject->code == RejectCode::malformed;
@@ -82,6 +78,7 @@ void ClientMachine::on_hello(const std::string& instance, const message::Hello& 
                             hello.name, misfit->what));
     }
     found->second.same_bits = !misfit;
+    found->second.frames_heard = now_;
     send(Channel::monitor, instance, welcome(found->second.peer.id()), found->second.peer.id());
     servers_changed();
 }
@@ -120,6 +117,7 @@ void ClientMachine::on(Server& server, message::PieceRequest& message) {
 void ClientMachine::on(Server& server, message::Ready& message) {
     if (message.session != session_ || message.epoch != work_.epoch() || message.state_hash != state_hash_)
         return;
+    server.ready_for = message.epoch;
     const bool joins = server.peer.state() == PeerState::syncing;
     if (joins) step_peer(server, PeerCause::synced, "It holds state and scene.");
     // An idle server repeats READY with its heartbeat: time to deal anew by what speeds turned out to be.
@@ -130,7 +128,8 @@ void ClientMachine::on(Server& server, message::Ready& message) {
 /// that broke; unless it was sent so recently that it may still be on its way.
 void ClientMachine::on(Server& server, message::Credit& message) {
     // It was welcomed by the client that ran before this one, and does not hear what this one says.
-    if (message.session != session_) return ask_who(server.instance);
+    if (message.session != session_) return void(ask_who(server.instance));
+    server.frames_heard = now_;
     server.credits.set_limit(std::min<std::size_t>(message.credits, k_most_credits));
     for (const LeaseId lease : server.credits.settle_lost(message.received, now_ - k_longest_way))
         release(lease, server.peer.id());
@@ -159,7 +158,7 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
     Server& server = found->second;
     const ServerId id = server.peer.id();
     step_peer(server, cause, why);
-    const std::size_t open = work_.indirect_ledger().outstanding(id);
+    const std::size_t open = indirect_.outstanding(id);
     revoke(id);
     if (cause == PeerCause::lost) store_.count(Counter::died, 1, id);
     log_note(fmt::format("{} {}: {} {} round{} of it go{} to others.", server.name,

@@ -11,8 +11,8 @@
 namespace pathscope {
 namespace {
 
-constexpr TimeNs k_who_pause = k_second_ns;
-constexpr std::size_t k_max_unknown_peers = 256;
+constexpr TimeNs k_answer_pause = k_second_ns;
+constexpr std::size_t k_max_answered = 256;
 
 std::uint64_t size_of(const Frames& frames) {
     return std::accumulate(frames.begin(), frames.end(), std::uint64_t{0},
@@ -44,8 +44,9 @@ TimeNs heartbeat_of(DetectorKind kind) {
 }  // namespace
 
 ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uint64_t session,
-                             EventStore& store, ClientWorld& world, TimeNs now)
+                             EventStore& store, ClientWorld& world, TimeNs now, IndirectWork* relayed)
     : config_(config),
+      strategy_(config.strategy),
       job_(std::move(job)),
       store_(store),
       world_(world),
@@ -57,12 +58,14 @@ ClientMachine::ClientMachine(const ClientConfig& config, ClientJob job, std::uin
       audit_(config.audit),
       work_({config.block_size, config.round_samples, config.schedule, config.order, config.sampling,
              config.audit.share > 0},
-            store) {
+            store),
+      indirect_(relayed ? *relayed : work_),
+      relays_(relayed != nullptr) {
     store_.name_server(k_local_server, "client");
     job_.state.files = job_.depot.manifest_hash();
     packed_state_ = pack(encode_state(job_.state));
     state_hash_ = hash_text(packed_state_);
-    work_.begin(job_.state.settings, Epoch{1}, now_);
+    work_.begin(own_frame(), Epoch{1}, now_);
     servers_changed();
 }
 
@@ -77,13 +80,23 @@ Result<void> ClientMachine::resume(const CheckpointFile& file) {
     return {};
 }
 
+/// That of a relay is empty.
+RenderSettings ClientMachine::own_frame() const {
+    RenderSettings settings = job_.state.settings;
+    if (relays_) {
+        settings.width = settings.height = 1;
+        settings.spp = settings.direct_spp = 0;
+    }
+    return settings;
+}
+
 // ---- Time.
 
 void ClientMachine::on_timers(TimeNs now) {
     now_ = now;
     if (probes_left_ > 0 && now_ >= next_probe_) probe_connections();
     if (now_ >= next_look_) watch_heartbeats();
-    work_.indirect_ledger().expire(now_);
+    indirect_.expire(now_);
     audit_.expire(now_);
     enforce_time_limit();
     hand_out();
@@ -93,7 +106,7 @@ TimeNs ClientMachine::next_timer(TimeNs now) const {
     TimeNs next = now + k_second_ns;
     if (probes_left_ > 0) next = std::min(next, next_probe_);
     if (!servers_.empty()) next = std::min(next, next_look_);
-    if (const auto deadline = work_.indirect_ledger().next_deadline()) next = std::min(next, *deadline);
+    if (const auto deadline = indirect_.next_deadline()) next = std::min(next, *deadline);
     if (const auto deadline = audit_.next_deadline()) next = std::min(next, *deadline);
     // After that time, what is missing for a picture is waited for like anything else.
     if (const TimeNs end = started_ + config_.time_limit; config_.time_limit > 0 && now < end)
@@ -133,8 +146,7 @@ void ClientMachine::change_state(RenderState state, std::shared_ptr<const Scene>
 void ClientMachine::begin_epoch(const PackMap& changes, bool same_frame) {
     const Epoch epoch{work_.epoch().value + 1};
     world_.cancel_all();
-    same_frame ? work_.begin_anew(job_.state.settings, epoch, now_)
-               : work_.begin(job_.state.settings, epoch, now_);
+    same_frame ? work_.begin_anew(own_frame(), epoch, now_) : work_.begin(own_frame(), epoch, now_);
     if (!same_frame) differing_rounds_ = 0;  // Those of a checkpoint stay.
     audit_.begin();
     gave_direct_.clear();
@@ -179,7 +191,8 @@ void ClientMachine::on_message(const std::string& instance, Frames frames, Chann
     if (const auto* hello = std::get_if<message::Hello>(&*decoded)) return on_hello(instance, *hello, sender);
     if (!server) {
         count_dropped(id, "It comes from a server that did not say HELLO.", channel);
-        return conduct_.ban_of(who, now_) ? void() : ask_who(instance);
+        if (!conduct_.ban_of(who, now_)) ask_who(instance);
+        return;
     }
     if (type_of(*decoded) != MessageType::pong) server->detector.on_traffic(now_);
     if (server->peer.state() == PeerState::suspect) step_peer(*server, PeerCause::heard, "It spoke again.");
@@ -198,7 +211,7 @@ void ClientMachine::count_dropped(ServerId server, std::string_view sentence, Ch
 void ClientMachine::reject_undecodable(const std::string& instance, const DecodeError& error,
                                        Channel channel) {
     if (channel != Channel::monitor) return;
-    if (error.fault == DecodeFault::version)
+    if (error.fault == DecodeFault::version && may_answer(instance))
         send(channel, instance,
              message::Reject{
                  RejectCode::version,
@@ -210,12 +223,18 @@ void ClientMachine::reject_undecodable(const std::string& instance, const Decode
         send(channel, instance, message::Reject{RejectCode::malformed, error.sentence, 0});
 }
 
-/// An unknown peer may be a server that was given up too early: it shall begin anew. At most once a second each.
-void ClientMachine::ask_who(const std::string& instance) {
-    std::erase_if(who_asked_, [this](const auto& asked) { return now_ - asked.second >= k_who_pause; });
-    if (who_asked_.size() >= k_max_unknown_peers || who_asked_.contains(instance)) return;
-    who_asked_.emplace(instance, now_);
+/// Who is no server is answered at most once a second, and not more than so many of them: who knocks cannot make the client
+/// talk as fast as it likes.
+bool ClientMachine::may_answer(const std::string& stranger) {
+    std::erase_if(answered_, [this](const auto& last) { return now_ - last.second >= k_answer_pause; });
+    return answered_.size() < k_max_answered && answered_.emplace(stranger, now_).second;
+}
+
+/// An unknown peer may be a server that was given up too early: it shall begin anew.
+bool ClientMachine::ask_who(const std::string& instance) {
+    if (!may_answer(instance)) return false;
     send(Channel::monitor, instance, message::Who{});
+    return true;
 }
 
 bool ClientMachine::send(Channel channel, const std::string& instance, Message message, ServerId peer) {

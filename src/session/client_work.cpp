@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pathscope/cluster/credit_policy.hpp"
+#include "pathscope/cluster/lease_size.hpp"
 #include "pathscope/core/log.hpp"
 
 namespace pathscope {
@@ -24,9 +25,9 @@ int ClientMachine::alive_servers() const {
 }
 
 bool ClientMachine::renders_alone() const {
-    return std::none_of(servers_.begin(), servers_.end(),
-                        [](const auto& entry) { return entry.second.stays(); }) &&
-           !expects_servers();
+    return !relays_ && std::none_of(servers_.begin(), servers_.end(), [](const auto& entry) {
+        return entry.second.stays();
+    }) && !expects_servers();
 }
 
 bool ClientMachine::expects_servers() const {
@@ -45,16 +46,19 @@ void ClientMachine::tell_schedule() {
     tell_schedule_ = false;
     std::vector<ServerShare> shares;
     int ready = 0;
+    places_ = 0;
     for (const auto& [instance, server] : servers_) {
         const PeerState state = server.peer.state();
         ready += state == PeerState::ready || state == PeerState::suspect;
         if (state == PeerState::ready || state == PeerState::suspect)
             shares.push_back({server.peer.id(), server.speed.per_second()});
+        if (server.peer.accepts_work())
+            places_ += std::min<std::uint64_t>(std::uint64_t{server.at_once} + 1, k_most_credits);
     }
     reached_min_servers_ = reached_min_servers_ || ready >= std::max(1, config_.min_servers);
     if (renders_alone()) shares.push_back({k_local_server, 0});
     std::sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
-    work_.set_servers(std::move(shares));
+    indirect_.set_servers(std::move(shares));
 }
 
 void ClientMachine::hand_out() {
@@ -73,10 +77,9 @@ void ClientMachine::hand_out() {
 
 /// To those that answered; to all only where it may be of use, for there may be thousands.
 void ClientMachine::hand_out_to_servers() {
-    const Ledger& ledger = work_.indirect_ledger();
-    const bool more_rounds = std::exchange(rounds_open_, ledger.rounds_open()) != ledger.rounds_open();
+    const bool more_rounds = std::exchange(rounds_open_, indirect_.rounds_open()) != indirect_.rounds_open();
     bool idle = false;
-    if (std::exchange(serve_all_, false) || more_rounds || !ledger.reopened().empty()) {
+    if (std::exchange(serve_all_, false) || more_rounds || indirect_.any_reopened()) {
         for (auto& [instance, server] : servers_) idle |= hand_out_to(server);
     } else {
         for (Server* const server : asking_) idle |= hand_out_to(*server);
@@ -84,23 +87,18 @@ void ClientMachine::hand_out_to_servers() {
     for (Server* const server : asking_) server->asks = false;
     asking_.clear();
     // Who found nothing to do may soon help a straggler.
-    if (idle && ledger.outstanding() > 0) next_look_ = std::min(next_look_, now_ + k_straggler_watch);
+    if (idle && indirect_.outstanding() > 0) next_look_ = std::min(next_look_, now_ + k_straggler_watch);
 }
 
 /// Whether it is left with nothing more to do though it could.
 bool ClientMachine::hand_out_to(Server& server) {
     while (server.peer.accepts_work() && server.credits.available() &&
            server.credits.owed() < window_of(server)) {
-        const std::size_t outstanding = work_.indirect_ledger().outstanding() + audit_.outstanding();
+        const std::size_t outstanding = indirect_.outstanding() + audit_.outstanding();
         if (outstanding >= most_leases(most_result_bytes())) return false;
         if (!grant_to(server)) return true;
     }
     return false;
-}
-
-/// Of a round of full size. Those at the frame's edge, and the scouts of an adaptive frame, are smaller.
-double ClientMachine::samples_of_full_round() const {
-    return double(config_.block_size) * config_.block_size * config_.round_samples;
 }
 
 std::uint64_t ClientMachine::most_result_bytes() const {
@@ -108,7 +106,17 @@ std::uint64_t ClientMachine::most_result_bytes() const {
 }
 
 std::size_t ClientMachine::window_of(const Server& server) const {
-    return credit_window(server.round_trip, server.speed.predict(samples_of_full_round()));
+    std::optional<TimeNs> lease_time = server.speed.predict(indirect_.samples_of_full_round());
+    if (lease_time) *lease_time *= rounds_per_lease_of(server);
+    return std::min(credit_window(server.round_trip, lease_time, server.at_once),
+                    credit_share(most_result_bytes(), servers_.size()));
+}
+
+std::uint32_t ClientMachine::rounds_per_lease_of(const Server& server) const {
+    // A filtered sum is not the sum of filtered rounds.
+    if (job_.state.settings.filter == FilterPlace::server) return 1;
+    return rounds_per_lease(config_.lease_time, server.speed.predict(indirect_.samples_of_full_round()),
+                            indirect_.rounds_waiting(), std::max<std::uint64_t>(1, places_));
 }
 
 bool ClientMachine::grant_to(Server& server) {
@@ -125,19 +133,27 @@ bool ClientMachine::grant_to(Server& server) {
     if (const auto item = next_audit(server))
         lease =
             grant_audit(*item, id, duration(work_.round_of(item->round.unit, item->samples), item->attempts));
-    if (!lease) lease = work_.grant_indirect(id, now_, duration);
-    if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0) {
-        // Nothing is open, but another server may be late with its last rounds.
-        if (auto estimate = server.speed.predict(samples_of_full_round())) {
-            // Of its turnaround, the rounds in front of it took a part.
-            *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(window_of(server)));
-            if (const auto straggler = pick_straggler(work_.indirect_ledger(), id, now_, *estimate))
-                lease = work_.indirect_ledger().grant_copy(id, *straggler, now_, lease_duration(estimate, 1));
-        }
-    }
+    if (!lease) lease = indirect_.grant_indirect(id, now_, rounds_per_lease_of(server), duration);
+    if (!lease && config_.schedule == ScheduleKind::pull && server.credits.owed() == 0)
+        lease = grant_straggler(server);  // Nothing is open, but another may be late with its last rounds.
     if (!lease) return false;
     send_lease(server, *lease);
     return true;
+}
+
+std::optional<Lease> ClientMachine::grant_straggler(Server& server) {
+    // Of its turnaround, the leases in front of it took a part.
+    const std::size_t window = window_of(server);
+    const std::size_t in_turn = window > server.at_once ? window - server.at_once + 1 : 1;
+    const auto own = [&](double samples) {
+        auto estimate = server.speed.predict(samples);
+        if (estimate) *estimate = std::max(*estimate, server.turnaround.mean() / TimeNs(in_turn));
+        return estimate;
+    };
+    const auto duration = [&](const Round& round, std::uint32_t) {
+        return lease_duration(own(double(round.samples())), 1);
+    };
+    return indirect_.copy_straggler(server.peer.id(), now_, own, duration);
 }
 
 void ClientMachine::send_lease(Server& server, const Lease& lease) {
@@ -148,9 +164,9 @@ void ClientMachine::send_lease(Server& server, const Lease& lease) {
     message.session = session_;
     message.lease = lease.id;
     message.epoch = lease.epoch;
-    message.strategy = std::string(name_of(config_.strategy));
+    message.strategy = std::string(name_of(strategy_));
     message.unit = lease.unit;
-    message.rect = work_.round_of(lease).rect;
+    message.rect = indirect_.round_of(lease).rect;
     message.first = lease.first;
     message.count = lease.count;
     message.lease_ms = std::uint32_t(std::clamp<TimeNs>(duration / k_millisecond_ns, 1, 3'600'000));
@@ -167,7 +183,7 @@ std::optional<ClientMachine::LocalWork> ClientMachine::next_local_work() {
     LocalWork work;
     const auto take_indirect = [&] {
         if (!announced_alone_) return;
-        work.indirect = work_.grant_indirect(k_local_server, now_,
+        work.indirect = work_.grant_indirect(k_local_server, now_, 1,
                                              [](const Round&, std::uint32_t) { return k_no_deadline; });
     };
     if (work_.direct_is_behind()) work.direct = work_.grant_direct(now_);
@@ -230,27 +246,27 @@ void ClientMachine::settle(LightPart part, const Lease& lease, const std::option
     const Commit commit = work_.commit(part, claim, result->sums, now_);
     if (commit.verdict == Verdict::accepted) {
         count_result(*result, k_local_server);
-        note_merged(part, claim, *result, result->sums);
+        note_merged(part, claim, commit.rounds, *result, result->sums);
     }
     cancel_superseded(commit.superseded);
 }
 
 void ClientMachine::on(Server& server, message::Tile& tile) {
+    server.frames_heard = now_;
     const ServerId id = server.peer.id();
     server.credits.settle(tile.lease);
     const ResultClaim claim{
         tile.lease, tile.session == session_ ? tile.epoch : Epoch{}, tile.unit, tile.first, tile.count, id};
     // Decoded only if it counts, committed only if it decodes.
     const bool audits = audit_.holds(claim);
-    if (const Verdict verdict = work_.indirect_ledger().judge(claim);
-        !audits && verdict != Verdict::accepted) {
-        work_.commit(LightPart::indirect, claim, {}, now_);
+    if (const Verdict verdict = indirect_.judge(claim); !audits && verdict != Verdict::accepted) {
+        indirect_.commit_indirect(claim, {}, {}, 0, now_);
         // Of rounds that were undone, results were on their way.
         const bool never_granted =
             (verdict == Verdict::unknown || verdict == Verdict::mismatched) && tile.lease > last_undone_;
         return never_granted ? offend(server.who, Offence::unknown_lease) : void();
     }
-    const PixelRect rect = work_.rect_of(tile.unit);
+    const PixelRect rect = audits ? work_.rect_of(tile.unit) : indirect_.rect_of(claim);
     RoundResult result;
     result.rays = tile.rays;
     result.samples = std::uint64_t(rect.area()) * tile.count;
@@ -258,8 +274,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     result.dropped_count = tile.dropped_count;
     result.saturated_count = tile.saturated_count;
     arrived_.resize(std::size_t(rect.area()));
-    if (const auto read =
-            read_strategy_result(config_.strategy, tile, rect, arrived_, job_.state.settings.wire);
+    if (const auto read = read_strategy_result(strategy_, tile, rect, arrived_, job_.state.settings.wire);
         !read) {
         release(tile.lease, id);
         count_dropped(id, read.error().message, Channel::frames);
@@ -268,7 +283,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
 
     if (audits) return on_opinion(claim, arrived_);
 
-    const Commit commit = work_.commit(LightPart::indirect, claim, arrived_, now_);
+    const Commit commit = indirect_.commit_indirect(claim, result, arrived_, tile.render_ns, now_);
     store_.count_all(
         {{Counter::tile_bytes, tile.result.size()}, {Counter::tile_bytes_unpacked, tile.raw_bytes}}, id);
     server.speed.add(double(result.samples), tile.render_ns);
@@ -276,10 +291,10 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     store_.add_latency(Latency::tile, commit.since_grant, id);
     count_result(result, id);
     if (!server.same_bits) {
-        ++differing_rounds_;
-        store_.count(Counter::differing_rounds, 1, id);
+        differing_rounds_ += commit.rounds;
+        store_.count(Counter::differing_rounds, commit.rounds, id);
     }
-    note_merged(LightPart::indirect, claim, result, arrived_);
+    note_merged(LightPart::indirect, claim, commit.rounds, result, arrived_);
     const bool may_be_drawn =
         store_.keeps_events() && is_plausible(tile.started_ns) && is_plausible(tile.render_ns);
     if (const auto offset = server.clock.at(now_); offset && may_be_drawn)
@@ -289,6 +304,7 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
 }
 
 void ClientMachine::on(Server& server, message::Nack& message) {
+    server.frames_heard = now_;
     server.credits.settle(message.lease);
     if (message.session != session_ || message.epoch != work_.epoch()) return;
     release(message.lease, server.peer.id());
@@ -329,12 +345,12 @@ void ClientMachine::cancel(const Lease& lease) {
 
 /// A lease ends without a result, whatever it was for.
 void ClientMachine::release(LeaseId lease, ServerId server) {
-    if (!audit_.release(lease, server)) work_.indirect_ledger().release(lease, server, now_);
+    if (!audit_.release(lease, server)) indirect_.release(lease, server, now_);
 }
 
 std::size_t ClientMachine::revoke(ServerId server) {
     audit_.revoke(server);
-    return work_.indirect_ledger().revoke(server, now_).size();
+    return indirect_.revoke(server, now_);
 }
 
 Progress ClientMachine::progress() const {

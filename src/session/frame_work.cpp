@@ -167,9 +167,27 @@ std::optional<double> FrameWork::estimated_error() const {
 
 // ---- Rounds.
 
-Round FrameWork::round_of(RoundKey key) const {
-    const SampleRange samples = samples_of_round(indirect_.ledger.plan(), key);
-    return grid_.round(block_of(key.unit), samples.first, samples.count);
+Round FrameWork::round_of(const RoundRun& run) const {
+    return round_of(run.first.unit, samples_of(indirect_.ledger.plan(), run));
+}
+
+std::optional<Lease> FrameWork::grant_indirect(ServerId server, TimeNs now, std::uint32_t most,
+                                               const LeaseTime& duration) {
+    Ledger& ledger = indirect_.ledger;
+    const std::optional<RoundKey> key = schedule_.pick(ledger, server);
+    if (!key) return std::nullopt;
+    const RoundRun run = ledger.grantable(*key, key->index == 0 ? 1 : most);
+    return ledger.grant(server, run, now, duration(round_of(run), ledger.attempts(*key)));
+}
+
+std::optional<Lease> FrameWork::copy_straggler(ServerId server, TimeNs now, const OwnTime& own,
+                                               const LeaseTime& duration) {
+    Ledger& ledger = indirect_.ledger;
+    const auto late = pick_straggler(
+        ledger, server, now, [&](const Lease& lease) { return own(double(round_of(lease).samples())); });
+    if (!late) return std::nullopt;
+    const RoundKey first = ledger.rounds_of(*late).first;
+    return ledger.grant_copy(server, first, now, duration(round_of(*late), ledger.attempts(first)));
 }
 
 std::optional<Lease> FrameWork::grant_direct(TimeNs now) {
@@ -178,11 +196,8 @@ std::optional<Lease> FrameWork::grant_direct(TimeNs now) {
 }
 
 std::optional<Lease> FrameWork::grant_direct_beside(const Lease& indirect, TimeNs now) {
-    const RoundKey key = indirect_.ledger.key_of(indirect);
-    const LedgerPlan& plan = direct_.ledger.plan();
-    const SampleRange samples{indirect.first, indirect.count};
-    if (key.index >= plan.rounds_of(key.unit) || samples_of_round(plan, key) != samples) return std::nullopt;
-    return direct_.ledger.grant(k_local_server, key, now, k_no_deadline);
+    const auto run = direct_.ledger.rounds_in(indirect.unit, {indirect.first, indirect.count});
+    return run ? direct_.ledger.grant(k_local_server, *run, now, k_no_deadline) : std::nullopt;
 }
 
 Commit FrameWork::commit(LightPart part, const ResultClaim& claim, std::span<const PixelSum> sums,

@@ -175,9 +175,8 @@ Result<void> GhostHost::Ghost::dial() {
 }
 
 void GhostHost::Ghost::tend() {
-    receive_all();
     do work();
-    while (machine_.linked() && !machine_.ended() && (receive_all() || to_load_));
+    while (machine_.linked() && !machine_.ended() && (receive_next() || to_load_));
 }
 
 /// Outcomes, and what is due.
@@ -198,18 +197,19 @@ TimeNs GhostHost::Ghost::next_timer(TimeNs now) const {
     return std::min(machine_.next_timer(now), renderer_.next().value_or(now + k_second_ns));
 }
 
-/// From the sockets that stirred. Whether anything was there.
-bool GhostHost::Ghost::receive_all() {
-    const bool told = std::exchange(stirred_[0], false) && receive(link_->monitor, Channel::monitor);
-    const bool leased = std::exchange(stirred_[1], false) && receive(link_->frames, Channel::frames);
-    return told || leased;
-}
-
-bool GhostHost::Ghost::receive(DealerSocket& socket, Channel channel) {
-    bool any = false;
-    for (; auto frames = socket.receive(); any = true)
-        machine_.on_message(std::move(*frames), channel, monotonic_now());
-    return any;
+/// One message of a socket that stirred, if there is any. One, and not all: to find out that a socket has nothing more is a
+/// system call, and it has to be found out again after the answer was sent.
+bool GhostHost::Ghost::receive_next() {
+    for (const Channel channel : {Channel::monitor, Channel::frames}) {
+        bool& stirred = stirred_[channel == Channel::frames];
+        if (!stirred) continue;
+        if (auto frames = socket_of(channel).receive()) {
+            machine_.on_message(std::move(*frames), channel, monotonic_now());
+            return true;
+        }
+        stirred = false;
+    }
+    return false;
 }
 
 void GhostHost::Ghost::leave() {
@@ -230,8 +230,7 @@ void GhostHost::Ghost::fill_tile(message::Tile& tile, const RoundResult& result,
 }
 
 bool GhostHost::Ghost::send(Channel channel, Frames&& frames) {
-    DealerSocket& socket = channel == Channel::monitor ? link_->monitor : link_->frames;
-    const bool left = socket.send(std::move(frames)) == SendOutcome::delivered;
+    const bool left = socket_of(channel).send(std::move(frames)) == SendOutcome::delivered;
     stir(channel);  // Even if it did not leave: the attempt may have taken in news of what arrived.
     return left;
 }

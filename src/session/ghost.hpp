@@ -80,9 +80,11 @@ class GhostHost::Ghost : private ServerWorld {
         DealerSocket monitor, frames;
     };
 
-    bool receive_all();
-    bool receive(DealerSocket& socket, Channel channel);
+    bool receive_next();
     void work();
+    [[nodiscard]] DealerSocket& socket_of(Channel channel) {
+        return channel == Channel::monitor ? link_->monitor : link_->frames;
+    }
 
     // The world, as the machine sees it.
     bool send(Channel channel, Frames&& frames) override;

@@ -166,7 +166,7 @@ void decode_size(FieldReader& state, RenderSettings& settings) {
 }
 
 SceneFile decode_scene(FieldReader& state) {
-    const std::string text = state.text("scene", 2, k_payload_limits.max_bytes);
+    const std::string text(state.text("scene", 2, k_payload_limits.max_bytes));
     if (state.error()) return {};
     Result<SceneFile> scene = parse_scene_file(text, "the client's scene");
     if (scene) return std::move(*scene);
@@ -175,7 +175,7 @@ SceneFile decode_scene(FieldReader& state) {
 }
 
 Digest decode_digest(FieldReader& fields, std::string_view name) {
-    const std::string bytes = fields.bytes(name, Digest{}.size(), Digest{}.size());
+    const std::string_view bytes = fields.bytes(name, Digest{}.size(), Digest{}.size());
     Digest digest{};
     if (bytes.size() == digest.size()) std::copy(bytes.begin(), bytes.end(), digest.begin());
     return digest;
@@ -290,7 +290,7 @@ Result<Manifest> unpack_manifest(std::string_view bytes) {
         const PackMap* file = item.get<PackMap>();
         if (!file) return bad_input("manifest: field 'files' must hold maps.");
         FieldReader entry(*file, "manifest file");
-        const std::string name = entry.bytes("name", 1, 4096);
+        const std::string name(entry.bytes("name", 1, 4096));
         const std::uint64_t size = entry.u64("size", 0, k_max_scene_bytes);
         const Digest hash = decode_digest(entry, "hash");
         if (entry.error()) return *entry.error();

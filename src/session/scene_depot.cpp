@@ -17,6 +17,12 @@ SceneDepot::SceneDepot(const DiskFiles& files) : SceneDepot(files.manifest(), {}
         if (const auto path = files.path_of(entry.name)) files_[entry.hash] = {*path, entry.size};
 }
 
+SceneDepot::SceneDepot(const Manifest& manifest, const SceneCache& cache)
+    : SceneDepot(manifest, std::map<Digest, File>()) {
+    for (const ManifestEntry& entry : manifest.files)
+        files_[entry.hash] = {cache.path_of(entry.hash), entry.size};
+}
+
 std::optional<message::Manifest> SceneDepot::answer(const message::ManifestRequest& request) const {
     if (request.scene != manifest_hash_) return std::nullopt;
     return message::Manifest{manifest_hash_, packed_manifest_};

@@ -24,7 +24,7 @@ void ServerMachine::on_linked(std::string instance, TimeNs now) {
     phase_ = Phase::hello;
     hello_pause_ = k_first_hello_pause;
     last_heard_ = now_;
-    next_hello_ = std::max(now_, banned_until_);
+    next_hello_ = std::max(now_, hello_not_before_);
 }
 
 void ServerMachine::relink(std::string why) {
@@ -38,7 +38,7 @@ void ServerMachine::on_refused(TimeNs now) {
 
 void ServerMachine::on_connection_lost(TimeNs now) {
     now_ = now;
-    banned_until_ = now_;
+    hello_not_before_ = now_;
     if (linked_ && phase_ == Phase::hello) next_hello_ = std::min(next_hello_, now_ + k_first_hello_pause);
 }
 
@@ -139,7 +139,8 @@ void ServerMachine::on(message::Bye& message) {
 
 void ServerMachine::on(message::Ping& message) {
     if (held_ && message.sequence > held_->sequence && !missed_since_) missed_since_ = now_;
-    send_monitor(message::Pong{message.token, now_, now_, world_.work_done(), std::uint32_t(leases_.size())});
+    send_monitor(message::Pong{message.token, now_, now_, world_.work_done(), std::uint32_t(leases_.size()),
+                               world_.leases_at_once()});
 }
 
 /// Whether it left. What is lost here is repeated by a timer: HELLO, requests, heartbeats.
@@ -162,6 +163,13 @@ void ServerMachine::say_goodbye(TimeNs now) {
     now_ = now;
     if (phase_ != Phase::hello)
         send_monitor(message::Bye{ByeReason::leaving, "The server was asked to stop."});
+}
+
+void ServerMachine::leave(std::string why, TimeNs now) {
+    now_ = now;
+    if (phase_ != Phase::hello) send_monitor(message::Bye{ByeReason::leaving, why});
+    relink_reason_ = std::move(why);
+    lose_link();
 }
 
 }  // namespace pathscope

@@ -33,12 +33,16 @@ void ServerMachine::on(message::Reject& message) {
     const TimeNs welcome_again = now_ + TimeNs(message.retry_ms) * k_millisecond_ns;
     if (phase_ != Phase::hello) {
         if (message.code != RejectCode::banned || message.retry_ms == 0) return;
-        banned_until_ = welcome_again;
+        hello_not_before_ = welcome_again;
         return relink(fmt::format("The client refuses this server for now: {}", message.text));
     }
     if (message.retry_ms == 0)
         return end(
             failed(fmt::format("The client at {} refuses this server: {}", identity_.client, message.text)));
+    if (message.code == RejectCode::malformed) {  // Then something is wrong with this connection.
+        hello_not_before_ = welcome_again;
+        return relink(fmt::format("The client cannot admit it so: {}", message.text));
+    }
     log_note(fmt::format("{}: not admitted yet: {}", identity_.name, message.text));
     next_hello_ = welcome_again;
 }
@@ -98,6 +102,7 @@ void ServerMachine::hold(HeldState held) {
 void ServerMachine::become_ready() {
     fetch_.reset();
     phase_ = Phase::work;
+    world_.on_state(held_->state);
     send_ready();
 }
 
@@ -130,7 +135,9 @@ void ServerMachine::advance_scene() {
 void ServerMachine::on_loaded(LoadedScene& loaded, TimeNs now) {
     now_ = now;
     loading_ = false;
-    if (loaded.scene) {
+    // The client may have gone back to the scene that is here, while this one was loaded: its leases are of that one.
+    const bool in_use = held_ && scene_ && same_scene(*scene_state_, held_->state);
+    if (loaded.scene && !in_use) {
         scene_ = std::move(*loaded.scene);
         scene_state_ = std::move(loaded.state);
     }

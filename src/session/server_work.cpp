@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "pathscope/protocol/block_result.hpp"
 
@@ -11,6 +12,11 @@ namespace {
 
 /// A client within its credits has fewer answers on their way than these and its credits: what is left are CREDIT and NACK.
 constexpr std::size_t k_more_answers = 8;
+
+/// What servers behind a relay count may add up to more.
+std::uint32_t as_u32(std::uint64_t count) {
+    return std::uint32_t(std::min<std::uint64_t>(count, std::numeric_limits<std::uint32_t>::max()));
+}
 
 }  // namespace
 
@@ -85,8 +91,8 @@ void ServerMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
     tile.started_ns = outcome.started;
     tile.render_ns = outcome.duration;
     tile.dropped = result.dropped;
-    tile.dropped_count = std::uint32_t(result.dropped_count);
-    tile.saturated_count = std::uint32_t(result.saturated_count);
+    tile.dropped_count = as_u32(result.dropped_count);
+    tile.saturated_count = as_u32(result.saturated_count);
     world_.fill_tile(tile, result, held_->state.settings.wire);
     send_answer(std::move(tile));
 }
@@ -95,15 +101,15 @@ void ServerMachine::refuse(const message::Lease& lease, NackCode code, std::stri
     send_answer(message::Nack{session_, lease.lease, lease.epoch, code, std::move(text)});
 }
 
-/// Gives back what was not begun; the round in work goes on.
+/// Gives back what was not begun; what is in work goes on.
 void ServerMachine::drain(TimeNs now) {
     now_ = now;
-    if (phase_ != Phase::work) return;
+    if (!linked_ || phase_ != Phase::work) return;
     draining_ = true;
     send_monitor(message::Bye{ByeReason::draining, "The server was asked to stop."});
     if (leases_.empty()) return;
     for (auto lease = std::next(leases_.begin()); lease != leases_.end(); ++lease)
-        world_.cancel(lease->first);
+        if (!world_.works_on(lease->first)) world_.cancel(lease->first);
 }
 
 }  // namespace pathscope

@@ -23,18 +23,28 @@ void FieldReader::fail(std::string_view name, std::string_view what) {
 }
 
 const PackValue* FieldReader::find(std::string_view name) {
-    const PackValue* value = map_->find(name);
-    if (!value) fail(name, "is missing");
-    return value;
+    const std::vector<PackEntry>& entries = map_->entries();
+    if (next_ >= entries.size() || entries[next_].key != name) {
+        next_ = std::size_t(std::ranges::find(entries, name, &PackEntry::key) - entries.begin());
+        if (next_ == entries.size()) {
+            fail(name, "is missing");
+            return nullptr;
+        }
+    }
+    return &entries[next_++].value;
+}
+
+template <class Kind>
+const Kind* FieldReader::as(std::string_view name, const PackValue& value, std::string_view expected) {
+    const Kind* kind = value.get<Kind>();
+    if (!kind) fail(name, fmt::format("is {}, not {}", value.kind(), expected));
+    return kind;
 }
 
 template <class Kind>
 const Kind* FieldReader::find_kind(std::string_view name, std::string_view expected) {
     const PackValue* value = find(name);
-    if (!value) return nullptr;
-    const Kind* kind = value->get<Kind>();
-    if (!kind) fail(name, fmt::format("is {}, not {}", value->kind(), expected));
-    return kind;
+    return value ? as<Kind>(name, *value, expected) : nullptr;
 }
 
 std::uint64_t FieldReader::u64(std::string_view name, std::uint64_t least, std::uint64_t most) {
@@ -42,7 +52,7 @@ std::uint64_t FieldReader::u64(std::string_view name, std::uint64_t least, std::
     if (!value) return least;
     if (const auto* negative = value->get<std::int64_t>())
         fail(name, fmt::format("is {}, which is not within {} and {}", *negative, least, most));
-    const auto* number = find_kind<std::uint64_t>(name, "integer");
+    const auto* number = as<std::uint64_t>(name, *value, "integer");
     if (!number) return least;
     if (*number < least || *number > most) fail(name, out_of_range(*number, least, most));
     return std::clamp(*number, least, most);
@@ -64,7 +74,7 @@ std::int64_t FieldReader::i64(std::string_view name, std::int64_t least, std::in
             return static_cast<std::int64_t>(*number);
         return least;
     }
-    const auto* number = find_kind<std::int64_t>(name, "integer");
+    const auto* number = as<std::int64_t>(name, *value, "integer");
     if (!number) return least;
     if (*number < least || *number > most) fail(name, out_of_range(*number, least, most));
     return std::clamp(*number, least, most);
@@ -78,7 +88,7 @@ double FieldReader::f64(std::string_view name, double least, double most) {
         number = static_cast<double>(*positive);
     else if (const auto* negative = value->get<std::int64_t>())
         number = static_cast<double>(*negative);
-    else if (const auto* real = find_kind<double>(name, "float"))
+    else if (const auto* real = as<double>(name, *value, "float"))
         number = *real;
     else
         return least;
@@ -92,7 +102,7 @@ bool FieldReader::boolean(std::string_view name) {
     return value && *value;
 }
 
-std::string FieldReader::text(std::string_view name, std::size_t min_bytes, std::size_t max_bytes) {
+std::string_view FieldReader::text(std::string_view name, std::size_t min_bytes, std::size_t max_bytes) {
     const auto* value = find_kind<std::string>(name, "text");
     if (!value) return {};
     if (value->size() < min_bytes || value->size() > max_bytes)
@@ -105,7 +115,7 @@ std::string FieldReader::text(std::string_view name, std::size_t min_bytes, std:
     return {};
 }
 
-std::string FieldReader::bytes(std::string_view name, std::size_t min_bytes, std::size_t max_bytes) {
+std::string_view FieldReader::bytes(std::string_view name, std::size_t min_bytes, std::size_t max_bytes) {
     const auto* value = find_kind<PackBytes>(name, "bytes");
     if (!value) return {};
     const std::size_t size = value->bytes.size();

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "pathscope/core/check.hpp"
-#include "pathscope/wire/bytes.hpp"
 #include "pathscope/wire/utf8.hpp"
 
 namespace pathscope {
@@ -28,97 +27,34 @@ constexpr std::uint8_t array16 = 0xDC, array32 = 0xDD, map16 = 0xDE, map32 = 0xD
 template <class T>
 constexpr std::uint64_t k_most = std::numeric_limits<T>::max();
 
-class Packer {
-  public:
+/// Visits a value and all that is in it.
+struct Packer {
+    PackWriter out;
+
     void value(const PackValue& value) { std::visit(*this, value.variant()); }
-    std::string take() { return out_.take(); }
 
-    void operator()(std::monostate) { out_.big(prefix::nil); }
-    void operator()(bool value) { out_.big(value ? prefix::true_ : prefix::false_); }
-    void operator()(double value) { prefixed(prefix::float64, value); }
-
-    void operator()(std::uint64_t value) {
-        if (value < 0x80)
-            out_.big(static_cast<std::uint8_t>(value));
-        else if (value <= k_most<std::uint8_t>)
-            prefixed(prefix::uint8, static_cast<std::uint8_t>(value));
-        else if (value <= k_most<std::uint16_t>)
-            prefixed(prefix::uint16, static_cast<std::uint16_t>(value));
-        else if (value <= k_most<std::uint32_t>)
-            prefixed(prefix::uint32, static_cast<std::uint32_t>(value));
-        else
-            prefixed(prefix::uint64, value);
-    }
-
-    /// Only negative ones: PackValue keeps the others as unsigned.
-    void operator()(std::int64_t value) {
-        if (value >= -32)
-            out_.big(static_cast<std::int8_t>(value));
-        else if (value >= std::numeric_limits<std::int8_t>::min())
-            prefixed(prefix::int8, static_cast<std::int8_t>(value));
-        else if (value >= std::numeric_limits<std::int16_t>::min())
-            prefixed(prefix::int16, static_cast<std::int16_t>(value));
-        else if (value >= std::numeric_limits<std::int32_t>::min())
-            prefixed(prefix::int32, static_cast<std::int32_t>(value));
-        else
-            prefixed(prefix::int64, value);
-    }
-
-    void operator()(const std::string& text) {
-        CHECK(is_utf8(text), text.size());
-        if (text.size() < 32)
-            out_.big(static_cast<std::uint8_t>(prefix::fixstr | text.size()));
-        else
-            length(text.size(), prefix::str8, prefix::str16, prefix::str32);
-        out_.raw(text);
-    }
-
-    void operator()(const PackBytes& value) {
-        length(value.bytes.size(), prefix::bin8, prefix::bin16, prefix::bin32);
-        out_.raw(value.bytes);
-    }
-
+    void operator()(std::monostate) { out.nil(); }
+    void operator()(bool value) { out.boolean(value); }
+    void operator()(double value) { out.real(value); }
+    void operator()(std::uint64_t value) { out.integer(value); }
+    void operator()(std::int64_t value) { out.integer(value); }
+    void operator()(const std::string& text) { out.text(text); }
+    void operator()(const PackBytes& value) { out.bytes(value.bytes); }
     void operator()(const PackArray& items) {
-        if (items.size() < 16)
-            out_.big(static_cast<std::uint8_t>(prefix::fixarray | items.size()));
-        else
-            length(items.size(), std::nullopt, prefix::array16, prefix::array32);
+        out.array(items.size());
         for (const PackValue& item : items) value(item);
     }
-
     void operator()(const PackMap& map) {
-        if (map.size() < 16)
-            out_.big(static_cast<std::uint8_t>(prefix::fixmap | map.size()));
-        else
-            length(map.size(), std::nullopt, prefix::map16, prefix::map32);
+        out.map(map.size());
         for (const PackEntry& entry : map.entries()) {
-            (*this)(entry.key);
+            out.text(entry.key);
             value(entry.value);
         }
     }
-
-  private:
-    template <class T>
-    void prefixed(std::uint8_t first, T number) {
-        out_.big(first);
-        out_.big(number);
-    }
-
-    void length(std::size_t size, std::optional<std::uint8_t> form8, std::uint8_t form16,
-                std::uint8_t form32) {
-        CHECK(size <= k_most<std::uint32_t>, size);
-        if (form8 && size <= k_most<std::uint8_t>)
-            prefixed(*form8, static_cast<std::uint8_t>(size));
-        else if (size <= k_most<std::uint16_t>)
-            prefixed(form16, static_cast<std::uint16_t>(size));
-        else
-            prefixed(form32, static_cast<std::uint32_t>(size));
-    }
-
-    ByteWriter out_;
 };
 
-/// Recursive descent with a budget. After an error every function returns nothing; its first sentence stays.
+/// Recursive descent with a budget, into the place where a value is to be. After an error every function returns false or
+/// nothing; the first sentence stays.
 class Unpacker {
   public:
     Unpacker(std::string_view bytes, const PackLimits& limits)
@@ -127,99 +63,104 @@ class Unpacker {
     Result<PackValue> whole() {
         if (size_ > limits_.max_bytes)
             return bad_input(fmt::format("{} bytes are more than the {} allowed.", size_, limits_.max_bytes));
-        auto result = value(0);
-        if (result && in_.remaining() > 0) result = fail("bytes follow the value");
-        if (!result) return bad_input(error_);
-        return std::move(*result);
+        PackValue result;
+        bool done = value(result, 0);
+        if (done && in_.remaining() > 0) done = fail("bytes follow the value");
+        if (!done) return bad_input(error_);
+        return Result<PackValue>(std::move(result));
     }
 
   private:
-    using MaybeValue = std::optional<PackValue>;
     using MaybeSize = std::optional<std::size_t>;
 
-    MaybeValue value(std::size_t depth) {
-        const auto first = start_element();
-        if (!first) return std::nullopt;
-        if (*first < prefix::fixmap) return PackValue(*first);
-        if (*first >= prefix::negative_fixint) return PackValue(static_cast<std::int8_t>(*first));
-        if (*first < prefix::fixarray) return map(*first & 0x0F, depth);
-        if (*first < prefix::fixstr) return array(*first & 0x0F, depth);
-        if (const auto text = this->text(*first)) return PackValue(*text);
-        if (!error_.empty()) return std::nullopt;
-        return long_form(*first, depth);
+    bool value(PackValue& out, std::size_t depth) {
+        std::uint8_t first = 0;
+        if (!start_element(first)) return false;
+        if (first < prefix::fixmap) return put(out, first);
+        if (first >= prefix::negative_fixint) return put(out, static_cast<std::int8_t>(first));
+        if (first < prefix::fixarray) return map(out, first & 0x0F, depth);
+        if (first < prefix::fixstr) return array(out, first & 0x0F, depth);
+        if (const auto text = this->text(first)) return put(out, *text);
+        return error_.empty() && long_form(out, first, depth);
     }
 
-    MaybeValue long_form(std::uint8_t first, std::size_t depth) {
+    bool long_form(PackValue& out, std::uint8_t first, std::size_t depth) {
         switch (first) {
             case prefix::nil:
-                return PackValue();
+                return put(out, PackValue());
             case prefix::false_:
-                return PackValue(false);
+                return put(out, false);
             case prefix::true_:
-                return PackValue(true);
+                return put(out, true);
             case prefix::bin8:
-                return bytes(length<std::uint8_t>());
+                return bytes(out, length<std::uint8_t>());
             case prefix::bin16:
-                return bytes(length<std::uint16_t>());
+                return bytes(out, length<std::uint16_t>());
             case prefix::bin32:
-                return bytes(length<std::uint32_t>());
+                return bytes(out, length<std::uint32_t>());
             case prefix::float32:
-                return number<float, double>();
+                return number<float, double>(out);
             case prefix::float64:
-                return number<double>();
+                return number<double>(out);
             case prefix::uint8:
-                return number<std::uint8_t>();
+                return number<std::uint8_t>(out);
             case prefix::uint16:
-                return number<std::uint16_t>();
+                return number<std::uint16_t>(out);
             case prefix::uint32:
-                return number<std::uint32_t>();
+                return number<std::uint32_t>(out);
             case prefix::uint64:
-                return number<std::uint64_t>();
+                return number<std::uint64_t>(out);
             case prefix::int8:
-                return number<std::int8_t>();
+                return number<std::int8_t>(out);
             case prefix::int16:
-                return number<std::int16_t>();
+                return number<std::int16_t>(out);
             case prefix::int32:
-                return number<std::int32_t>();
+                return number<std::int32_t>(out);
             case prefix::int64:
-                return number<std::int64_t>();
+                return number<std::int64_t>(out);
             case prefix::array16:
-                return array(length<std::uint16_t>(), depth);
+                return array(out, length<std::uint16_t>(), depth);
             case prefix::array32:
-                return array(length<std::uint32_t>(), depth);
+                return array(out, length<std::uint32_t>(), depth);
             case prefix::map16:
-                return map(length<std::uint16_t>(), depth);
+                return map(out, length<std::uint16_t>(), depth);
             case prefix::map32:
-                return map(length<std::uint32_t>(), depth);
+                return map(out, length<std::uint32_t>(), depth);
             default:
                 return fail(fmt::format("prefix 0x{:02x} is of no supported type", first));
         }
     }
 
-    std::optional<std::uint8_t> start_element() {
+    template <class T>
+    static bool put(PackValue& out, T&& value) {
+        out = PackValue(std::forward<T>(value));
+        return true;
+    }
+
+    bool start_element(std::uint8_t& first) {
         if (++elements_ > limits_.max_elements)
             return fail(fmt::format("more than {} elements", limits_.max_elements));
-        const auto first = in_.big<std::uint8_t>();
-        if (!first) return truncated();
-        return first;
+        const auto read = in_.big<std::uint8_t>();
+        if (!read) return truncated();
+        first = *read;
+        return true;
     }
 
     template <class Read, class Keep = Read>
-    MaybeValue number() {
+    bool number(PackValue& out) {
         const auto read = in_.big<Read>();
-        if (!read) return truncated();
-        return PackValue(static_cast<Keep>(*read));
+        return read ? put(out, static_cast<Keep>(*read)) : truncated();
     }
 
     template <class T>
     MaybeSize length() {
-        const auto read = in_.big<T>();
-        if (!read) return truncated();
-        return *read;
+        if (const auto read = in_.big<T>()) return *read;
+        truncated();
+        return std::nullopt;
     }
 
     /// Nothing, without an error, if this prefix is not one of a text.
-    std::optional<std::string> text(std::uint8_t first) {
+    std::optional<std::string_view> text(std::uint8_t first) {
         MaybeSize size;
         if (first >= prefix::fixstr && first < prefix::nil)
             size = first & 0x1F;
@@ -232,16 +173,17 @@ class Unpacker {
         if (!size) return std::nullopt;
 
         const auto taken = in_.raw(*size);
-        if (!taken) return truncated();
-        if (!is_utf8(*taken)) return fail("a text is not UTF-8");
-        return std::string(*taken);
+        if (!taken)
+            truncated();
+        else if (!is_utf8(*taken))
+            fail("a text is not UTF-8");
+        return error_.empty() ? taken : std::nullopt;
     }
 
-    MaybeValue bytes(MaybeSize size) {
-        if (!size) return std::nullopt;
+    bool bytes(PackValue& out, MaybeSize size) {
+        if (!size) return false;
         const auto taken = in_.raw(*size);
-        if (!taken) return truncated();
-        return PackValue(PackBytes{std::string(*taken)});
+        return taken ? put(out, PackBytes{std::string(*taken)}) : truncated();
     }
 
     /// A claim of more items than bytes are left is refused before anything is built for it.
@@ -254,48 +196,48 @@ class Unpacker {
         return error_.empty();
     }
 
-    MaybeValue array(MaybeSize count, std::size_t depth) {
-        if (!may_enter(count, 1, depth)) return std::nullopt;
+    bool array(PackValue& out, MaybeSize count, std::size_t depth) {
+        if (!may_enter(count, 1, depth)) return false;
         PackArray items;
-        for (std::size_t i = 0; i < *count; ++i) {
-            auto item = value(depth + 1);
-            if (!item) return std::nullopt;
-            items.push_back(std::move(*item));
-        }
-        return PackValue(std::move(items));
+        items.reserve(std::min(*count, k_reserved));
+        for (std::size_t i = 0; i < *count; ++i)
+            if (!value(items.emplace_back(), depth + 1)) return false;
+        return put(out, std::move(items));
     }
 
-    MaybeValue map(MaybeSize count, std::size_t depth) {
-        if (!may_enter(count, 2, depth)) return std::nullopt;
+    bool map(PackValue& out, MaybeSize count, std::size_t depth) {
+        if (!may_enter(count, 2, depth)) return false;
         std::vector<PackEntry> entries;
+        entries.reserve(std::min(*count, k_reserved));
         for (std::size_t i = 0; i < *count; ++i) {
-            auto key = this->key();
-            if (!key) return std::nullopt;
-            auto item = value(depth + 1);
-            if (!item) return std::nullopt;
-            entries.push_back({std::move(*key), std::move(*item)});
+            PackEntry& entry = entries.emplace_back();
+            if (!key(entry.key) || !value(entry.value, depth + 1)) return false;
         }
         auto map = PackMap::from_entries(std::move(entries));
-        if (!map) return fail("a map has a key twice");
-        return PackValue(std::move(*map));
+        return map ? put(out, std::move(*map)) : fail("a map has a key twice");
     }
 
-    std::optional<std::string> key() {
-        const auto first = start_element();
-        if (!first) return std::nullopt;
-        auto key = text(*first);
-        if (!key) fail("a key is not text");
-        return key;
+    bool key(std::string& out) {
+        std::uint8_t first = 0;
+        if (!start_element(first)) return false;
+        const auto key = text(first);
+        if (!key) return fail("a key is not text");
+        out = *key;
+        return true;
     }
 
-    std::nullopt_t truncated() { return fail("the bytes end inside a value"); }
+    bool truncated() { return fail("the bytes end inside a value"); }
 
-    std::nullopt_t fail(std::string_view what) {
+    /// False, for all to return.
+    bool fail(std::string_view what) {
         if (error_.empty())
             error_ =
                 fmt::format("Not MessagePack of ours: {} (before byte {}).", what, size_ - in_.remaining());
-        return std::nullopt;
+        return false;
     }
+
+    /// Of a header, all; of what a claim alone would have us set aside, little.
+    static constexpr std::size_t k_reserved = 32;
 
     ByteReader in_;
     std::size_t size_;
@@ -303,6 +245,22 @@ class Unpacker {
     std::size_t elements_ = 0;
     std::string error_;
 };
+
+bool has_twins(const std::vector<PackEntry>& entries) {
+    constexpr std::size_t k_few = 32;  // Comparing each with each is the quickest then.
+    if (entries.size() <= k_few) {
+        for (std::size_t i = 1; i < entries.size(); ++i)
+            for (std::size_t j = 0; j < i; ++j)
+                if (entries[i].key == entries[j].key) return true;
+        return false;
+    }
+    // A peer may send a map of half a million keys.
+    std::vector<std::string_view> keys;
+    keys.reserve(entries.size());
+    for (const PackEntry& entry : entries) keys.push_back(entry.key);
+    std::ranges::sort(keys);
+    return std::ranges::adjacent_find(keys) != keys.end();
+}
 
 }  // namespace
 
@@ -323,13 +281,7 @@ PackMap& PackMap::operator=(PackMap&&) noexcept = default;
 PackMap::~PackMap() = default;
 
 std::optional<PackMap> PackMap::from_entries(std::vector<PackEntry> entries) {
-    // By sorting, not by looking each key up: a peer may send a map of half a million keys.
-    std::vector<std::string_view> keys;
-    keys.reserve(entries.size());
-    for (const PackEntry& entry : entries) keys.push_back(entry.key);
-    std::ranges::sort(keys);
-    if (std::ranges::adjacent_find(keys) != keys.end()) return std::nullopt;
-
+    if (has_twins(entries)) return std::nullopt;
     PackMap map;
     map.entries_ = std::move(entries);
     return map;
@@ -354,7 +306,88 @@ std::string_view PackValue::kind() const {
 std::string pack(const PackValue& value) {
     Packer packer;
     packer.value(value);
-    return packer.take();
+    return packer.out.take();
+}
+
+// ---- The writer.
+
+void PackWriter::nil() { out_.big(prefix::nil); }
+
+void PackWriter::boolean(bool value) { out_.big(value ? prefix::true_ : prefix::false_); }
+
+void PackWriter::real(double value) { prefixed(prefix::float64, value); }
+
+void PackWriter::integer(std::uint64_t value) {
+    if (value < 0x80)
+        out_.big(static_cast<std::uint8_t>(value));
+    else if (value <= k_most<std::uint8_t>)
+        prefixed(prefix::uint8, static_cast<std::uint8_t>(value));
+    else if (value <= k_most<std::uint16_t>)
+        prefixed(prefix::uint16, static_cast<std::uint16_t>(value));
+    else if (value <= k_most<std::uint32_t>)
+        prefixed(prefix::uint32, static_cast<std::uint32_t>(value));
+    else
+        prefixed(prefix::uint64, value);
+}
+
+void PackWriter::integer(std::int64_t value) {
+    if (value >= 0)
+        integer(static_cast<std::uint64_t>(value));
+    else if (value >= -32)
+        out_.big(static_cast<std::int8_t>(value));
+    else if (value >= std::numeric_limits<std::int8_t>::min())
+        prefixed(prefix::int8, static_cast<std::int8_t>(value));
+    else if (value >= std::numeric_limits<std::int16_t>::min())
+        prefixed(prefix::int16, static_cast<std::int16_t>(value));
+    else if (value >= std::numeric_limits<std::int32_t>::min())
+        prefixed(prefix::int32, static_cast<std::int32_t>(value));
+    else
+        prefixed(prefix::int64, value);
+}
+
+void PackWriter::text(std::string_view text) {
+    CHECK(is_utf8(text), text.size());
+    if (text.size() < 32)
+        out_.big(static_cast<std::uint8_t>(prefix::fixstr | text.size()));
+    else
+        length(text.size(), prefix::str8, prefix::str16, prefix::str32);
+    out_.raw(text);
+}
+
+void PackWriter::bytes(std::string_view bytes) {
+    length(bytes.size(), prefix::bin8, prefix::bin16, prefix::bin32);
+    out_.raw(bytes);
+}
+
+void PackWriter::array(std::size_t items) {
+    if (items < 16)
+        out_.big(static_cast<std::uint8_t>(prefix::fixarray | items));
+    else
+        length(items, std::nullopt, prefix::array16, prefix::array32);
+}
+
+void PackWriter::map(std::size_t entries) {
+    if (entries < 16)
+        out_.big(static_cast<std::uint8_t>(prefix::fixmap | entries));
+    else
+        length(entries, std::nullopt, prefix::map16, prefix::map32);
+}
+
+template <class T>
+void PackWriter::prefixed(std::uint8_t first, T number) {
+    out_.big(first);
+    out_.big(number);
+}
+
+void PackWriter::length(std::size_t size, std::optional<std::uint8_t> form8, std::uint8_t form16,
+                        std::uint8_t form32) {
+    CHECK(size <= k_most<std::uint32_t>, size);
+    if (form8 && size <= k_most<std::uint8_t>)
+        prefixed(*form8, static_cast<std::uint8_t>(size));
+    else if (size <= k_most<std::uint16_t>)
+        prefixed(form16, static_cast<std::uint16_t>(size));
+    else
+        prefixed(form32, static_cast<std::uint32_t>(size));
 }
 
 Result<PackValue> unpack(std::string_view bytes, const PackLimits& limits) {

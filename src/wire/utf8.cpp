@@ -39,6 +39,14 @@ Character first_character(std::string_view text) {
     return {code, bytes};
 }
 
+/// Most texts are nothing else, and then no character need be put together.
+bool is_printable_ascii(std::string_view text) {
+    bool printable = true;
+    for (const char byte : text)
+        printable &= byte >= ' ' && byte <= '~';  // Above 127 a char is negative, or large.
+    return printable;
+}
+
 bool is_control(char32_t code) { return code < 0x20 || (code >= 0x7F && code < 0xA0); }
 
 template <class Accept>
@@ -54,11 +62,11 @@ bool all_characters(std::string_view text, Accept accept) {
 }  // namespace
 
 bool is_utf8(std::string_view text) {
-    return all_characters(text, [](char32_t) { return true; });
+    return is_printable_ascii(text) || all_characters(text, [](char32_t) { return true; });
 }
 
 bool is_printable_utf8(std::string_view text) {
-    return all_characters(text, [](char32_t code) { return !is_control(code); });
+    return is_printable_ascii(text) || all_characters(text, [](char32_t code) { return !is_control(code); });
 }
 
 std::string make_printable(std::string_view text, std::size_t max_bytes) {

@@ -42,17 +42,19 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
     s.new_images = static_cast<int>(below(3));
     s.crashes = below(4) == 0 ? 1 : 0;
     s.stop_at = below(5) == 0 ? from_seconds(1 + 10 * rng.next_float()) : 0;
+    s.most_rounds = below(2) == 0 ? 1 : 1 + below(8);
     return s;
 }
 
 std::string ClusterSettings::describe() const {
     return fmt::format(
-        "{} servers, {} units x {} samples in rounds of {}, {}, {}, drop {:.2f}, duplicate {:.2f}, refuse "
+        "{} servers, {} units x {} samples in rounds of {}, leases of up to {}, {}, {}, drop {:.2f}, "
+        "duplicate {:.2f}, refuse "
         "{:.2f}, "
         "lie {:.2f}, careless {:.2f}, {:.1f} faults/s, {} images, {} crashes{}{}",
-        servers, units, samples, round_samples, name_of(schedule), name_of(detector), drop, duplicate, refuse,
-        lie, careless, faults_per_second, new_images + 1, crashes, local_fallback ? ", local fallback" : "",
-        stop_at > 0 ? ", open-ended" : "");
+        servers, units, samples, round_samples, most_rounds, name_of(schedule), name_of(detector), drop,
+        duplicate, refuse, lie, careless, faults_per_second, new_images + 1, crashes,
+        local_fallback ? ", local fallback" : "", stop_at > 0 ? ", open-ended" : "");
 }
 
 FakeCluster::FakeCluster(const ClusterSettings& settings)
@@ -303,16 +305,21 @@ void FakeCluster::hand_out() {
 
 void FakeCluster::hand_out_to(ServerId id, Seat& seat) {
     while (seat.peer.accepts_work() && seat.credits.available()) {
-        const std::optional<TimeNs> each = seat.speed.predict(settings_.round_samples);
+        const std::uint32_t most = 1 + rng_.next_u32() % settings_.most_rounds;
+        const std::optional<TimeNs> each = seat.speed.predict(settings_.round_samples * most);
         const auto predicted = each ? std::optional(*each * TimeNs(1 + seat.credits.owed())) : std::nullopt;
         std::optional<Lease> lease;
         if (const auto round = schedule_.pick(ledger_, id)) {
-            lease = ledger_.grant(id, *round, now_, lease_duration(predicted, ledger_.attempts(*round)));
+            lease = ledger_.grant(id, ledger_.grantable(*round, most), now_,
+                                  lease_duration(predicted, ledger_.attempts(*round)));
             if (!lease) fail("the schedule proposed a round that is not open");
         } else if (predicted) {
-            if (const auto late = pick_straggler(ledger_, id, now_, *predicted))
+            const auto own = [&](const Lease& late) { return seat.speed.predict(late.count); };
+            if (const auto late = pick_straggler(ledger_, id, now_, own)) {
+                const RoundKey first = ledger_.rounds_of(*late).first;
                 lease =
-                    ledger_.grant_copy(id, *late, now_, lease_duration(predicted, ledger_.attempts(*late)));
+                    ledger_.grant_copy(id, first, now_, lease_duration(predicted, ledger_.attempts(first)));
+            }
         }
         if (!lease) return;
         seat.credits.take(lease->id, now_, lease->deadline + (lease->deadline - lease->granted));
@@ -329,7 +336,7 @@ void FakeCluster::grant_carelessly() {
     const std::uint32_t first = round.index * plan.round_samples;
     const std::vector<Lease> held = ledger_.outstanding_leases();
     const bool is_held = std::any_of(held.begin(), held.end(), [&](const Lease& lease) {
-        return lease.unit == round.unit && lease.first == first;
+        return lease.unit == round.unit && first - lease.first < lease.count;
     });
     const bool is_merged = merged_[round.unit].contains(first);
     if (ledger_.grant(seats_.begin()->first, round, now_, k_second_ns) &&
@@ -401,8 +408,10 @@ void FakeCluster::merge(const Result& result) {
     last_progress_ = now_;
     if (result.image != image_)
         return fail(fmt::format("merged a result of image {} into image {}", result.image, image_));
-    if (!merged_[claim.unit].insert(claim.first).second)
-        return fail(fmt::format("merged samples {} of unit {} twice", claim.first, claim.unit));
+    for (std::uint32_t first = claim.first; first < claim.first + claim.count;
+         first += settings_.round_samples)
+        if (!merged_[claim.unit].insert(first).second)
+            return fail(fmt::format("merged samples {} of unit {} twice", first, claim.unit));
 }
 
 void FakeCluster::fail(std::string why) {

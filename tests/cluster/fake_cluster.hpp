@@ -36,6 +36,7 @@ struct ClusterSettings {
     std::uint32_t units = 12;
     std::uint32_t samples = 20;
     std::uint32_t round_samples = 4;
+    std::uint32_t most_rounds = 1;  ///< In one lease; how many is drawn each time.
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;
     float drop = 0;       ///< Of each message, its chance.

@@ -149,17 +149,18 @@ TEST_CASE("what is rendered again is audited again, and what is stopped is not")
 
 TEST_CASE("contributions tell which units hold something of a server, and how much there is to take back") {
     Contributions gave;
-    gave.add(2, {k_a, 1, 16, 48, 0, 0});
-    gave.add(2, {k_b, 1, 16, 50, 1, 0});
-    gave.add(2, {k_a, 1, 8, 20, 0, 2});
-    gave.add(7, {k_b, 1, 16, 40, 0, 0});
+    gave.add(2, {k_a, 1, 3, 16, 48, 0, 0});
+    gave.add(2, {k_b, 1, 1, 16, 50, 1, 0});
+    gave.add(2, {k_a, 1, 2, 8, 20, 0, 2});
+    gave.add(7, {k_b, 1, 1, 16, 40, 0, 0});
     const std::array<ServerId, 1> only_a{k_a};
     const std::array<ServerId, 2> both{k_a, k_b};
     CHECK(gave.units_of(only_a) == std::vector<std::uint32_t>{2});
     CHECK(gave.units_of(both) == std::vector<std::uint32_t>{2, 7});
     const auto taken = gave.take(2);
     REQUIRE(taken.size() == 2);
-    CHECK(taken[0].rounds == 2);
+    CHECK(taken[0].tiles == 2);
+    CHECK(taken[0].rounds == 5);
     CHECK(taken[0].samples == 24);
     CHECK(taken[0].rays == 68);
     CHECK(taken[0].saturated == 2);

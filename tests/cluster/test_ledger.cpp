@@ -74,7 +74,8 @@ TEST_CASE("a staged plan grants what is open, group by group with samples of its
     const SampleRange expected[] = {{0, 4}, {4, 2}, {100, 1}, {101, 1}, {102, 1}};
     for (std::size_t i = 0; i < leases.size(); ++i) {
         CHECK(SampleRange{leases[i].first, leases[i].count} == expected[i]);
-        CHECK(ledger.key_of(leases[i]) == RoundKey{i < 2 ? 1u : 3u, std::uint32_t(i < 2 ? i : i - 2)});
+        CHECK(ledger.rounds_of(leases[i]).first ==
+              RoundKey{i < 2 ? 1u : 3u, std::uint32_t(i < 2 ? i : i - 2)});
         CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::accepted);
         CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::duplicate);
         check_audit(ledger);
@@ -422,5 +423,140 @@ TEST_CASE("the store's counters are the ledger's") {
     for (const ServerId server : {k_a, k_b})
         CHECK(store.server(server)->total(Counter::rounds_committed) == 1);
     CHECK(store.server(k_c)->total(Counter::reallocated) == 1);
+    check_audit(ledger);
+}
+
+// ---- Leases of several rounds.
+
+TEST_CASE("one lease holds rounds that follow each other, and brings them together") {
+    EventStore store;
+    Ledger ledger = ledger_of(plan_of(2, 10, 4), &store);  // Rounds of 4, 4 and 2 samples.
+    CHECK(ledger.rounds_waiting() == 6);
+    CHECK(ledger.grantable({0, 0}, 2).rounds == 2);
+    CHECK(ledger.grantable({0, 0}, 9).rounds == 3);
+    CHECK(ledger.grantable({0, 1}, 1).rounds == 0);  // Out of turn.
+    CHECK(ledger.grantable({2, 0}, 1).rounds == 0);
+    CHECK_FALSE(ledger.grant(k_a, RoundRun({0, 0}, 4), 0, k_lease).has_value());
+    CHECK_FALSE(ledger.grant(k_a, RoundRun({0, 0}, 0), 0, k_lease).has_value());
+
+    const Lease one = *ledger.grant(k_a, {0, 0}, 0, k_lease);
+    const Lease two = *ledger.grant(k_b, ledger.grantable({0, 1}, 9), 0, k_lease);
+    CHECK(SampleRange{two.first, two.count} == SampleRange{4, 6});
+    CHECK(ledger.rounds_of(two).rounds == 2);
+    CHECK(ledger.rounds_waiting() == 3);
+    CHECK(ledger.outstanding() == 2);
+    check_audit(ledger);
+
+    for (auto [first, count] :
+         {SampleRange{4, 4}, SampleRange{8, 2}, SampleRange{4, 5}, SampleRange{0, 10}}) {
+        ResultClaim part = claim_of(two);  // Taken whole or not at all.
+        part.first = first;
+        part.count = count;
+        CHECK(verdict_of(ledger, part) == Verdict::mismatched);
+    }
+    const Commit commit = ledger.commit(claim_of(two), 5);
+    CHECK(commit.verdict == Verdict::accepted);
+    CHECK(commit.rounds == 2);
+    CHECK(ledger.rounds_committed() == 2);
+    CHECK(store.total(Counter::rounds_committed) == 2);
+    CHECK(ledger.samples_committed(0) == 6);
+    CHECK(verdict_of(ledger, claim_of(two)) == Verdict::duplicate);
+    CHECK(ledger.snapshot(0).missing == std::vector<std::uint32_t>{0});
+    check_audit(ledger);
+    CHECK(verdict_of(ledger, claim_of(one)) == Verdict::accepted);
+    CHECK(ledger.samples_committed(0) == 10);
+    check_audit(ledger);
+}
+
+TEST_CASE("the rounds of a lease that ends are open again, and go on together or apart") {
+    Ledger ledger = ledger_of(plan_of(1, 6, 1));
+    const Lease three = *ledger.grant(k_a, RoundRun({0, 0}, 3), 0, k_lease);
+    const Lease rest = *ledger.grant(k_b, RoundRun({0, 3}, 3), 0, k_lease);
+    CHECK(ledger.expire(k_lease).size() == 2);
+    CHECK(ledger.reopened().size() == 6);
+    check_audit(ledger);
+    CHECK(ledger.grantable({0, 1}, 9).rounds == 2);  // Up to where another server held them.
+    const Lease middle = *ledger.grant(k_c, RoundRun({0, 1}, 1), k_lease, k_lease);
+    CHECK(ledger.counts().reallocated == 1);
+    CHECK(ledger.grantable({0, 0}, 9).rounds == 1);
+    CHECK_FALSE(ledger.grant(k_c, RoundRun({0, 0}, 2), k_lease, k_lease).has_value());
+    CHECK(ledger.release(middle.id, k_c, k_lease)->id == middle.id);
+    check_audit(ledger);
+
+    // Late, but nobody was quicker.
+    CHECK(verdict_of(ledger, claim_of(rest)) == Verdict::accepted);
+    CHECK(verdict_of(ledger, claim_of(three)) == Verdict::accepted);
+    CHECK(ledger.counts().late == 2);
+    CHECK(ledger.complete());
+    check_audit(ledger);
+}
+
+TEST_CASE("a late result of which a round is committed counts nothing, and the others are still to be done") {
+    Ledger ledger = ledger_of(plan_of(1, 3, 1));
+    const Lease all = *ledger.grant(k_a, RoundRun({0, 0}, 3), 0, k_lease);
+    ledger.expire(k_lease);
+    const Lease middle = *ledger.grant(k_b, {0, 1}, k_lease, k_lease);
+    CHECK(verdict_of(ledger, claim_of(middle)) == Verdict::accepted);
+    CHECK(verdict_of(ledger, claim_of(all)) == Verdict::duplicate);
+    CHECK(ledger.samples_committed(0) == 1);
+    CHECK(ledger.reopened().size() == 2);
+    check_audit(ledger);
+}
+
+TEST_CASE("a late result supersedes whoever holds a round of it, and what they hold beyond is open again") {
+    EventStore store;
+    Ledger ledger = ledger_of(plan_of(1, 4, 1), &store);
+    const Lease slow = *ledger.grant(k_a, RoundRun({0, 0}, 2), 0, k_lease);
+    const Lease next = *ledger.grant(k_a, RoundRun({0, 2}, 2), 0, k_lease);
+    ledger.expire(k_lease);
+    const Lease other = *ledger.grant(k_b, ledger.grantable({0, 1}, 3), k_lease, k_lease);
+    CHECK(other.count == 3);
+    CHECK(ledger.reopened().size() == 1);
+    const Commit commit = ledger.commit(claim_of(slow), k_lease);
+    CHECK(commit.verdict == Verdict::accepted);
+    CHECK(commit.late);
+    REQUIRE(commit.superseded.size() == 1);
+    CHECK(commit.superseded.front().id == other.id);
+    CHECK(ledger.outstanding() == 0);
+    CHECK(ledger.reopened().size() == 2);
+    check_audit(ledger);
+    CHECK(verdict_of(ledger, claim_of(other)) == Verdict::duplicate);
+    CHECK(verdict_of(ledger, claim_of(next)) == Verdict::accepted);  // It is remembered still.
+    CHECK(ledger.complete());
+    check_audit(ledger);
+}
+
+TEST_CASE("a straggler's rounds are copied together") {
+    Ledger ledger = ledger_of(plan_of(1, 3, 1));
+    const Lease slow = *ledger.grant(k_a, RoundRun({0, 0}, 3), 0, k_lease);
+    const Lease copy = *ledger.grant_copy(k_b, {0, 2}, 0, 2 * k_lease);
+    CHECK(copy.first == slow.first);
+    CHECK(copy.count == slow.count);
+    CHECK(ledger.expire(k_lease).size() == 1);
+    CHECK(ledger.reopened().empty());  // The copy holds them.
+    check_audit(ledger);
+    CHECK(verdict_of(ledger, claim_of(copy)) == Verdict::accepted);
+    CHECK(verdict_of(ledger, claim_of(slow)) == Verdict::duplicate);
+    CHECK(ledger.complete());
+    check_audit(ledger);
+}
+
+TEST_CASE("no claim about rounds is too large to be judged") {
+    Ledger ledger = ledger_of(plan_of(2, 7, 2));
+    const Lease lease = *ledger.grant(k_a, {0, 0}, 0, k_lease);
+    for (const std::uint32_t number : {0u, 1u, 3u, 6u, 7u, 8u, 1u << 20, 1u << 31, ~0u - 1, ~0u}) {
+        ResultClaim claim = claim_of(lease);
+        claim.lease.value = 1;  // Known, but of other work.
+        claim.first = number;
+        CHECK(verdict_of(ledger, claim) == (number == 0 ? Verdict::accepted : Verdict::mismatched));
+        if (number == 0) continue;
+        claim.first = 0;
+        claim.count = number;
+        CHECK(verdict_of(ledger, claim) ==
+              (number == 6 || number == 7 ? Verdict::duplicate : Verdict::mismatched));
+        claim.unit = number;
+        claim.count = 2;
+        CHECK(verdict_of(ledger, claim) == (number == 1 ? Verdict::unknown : Verdict::mismatched));
+    }
     check_audit(ledger);
 }

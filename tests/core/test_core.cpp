@@ -45,6 +45,14 @@ TEST_CASE("hash_text is BLAKE2b-256") {
     parts.add("a");
     parts.add("bc");
     CHECK(to_hex(parts.finish()) == abc);
+    // More than one block of 128 bytes, in parts that end within, at and beyond its end.
+    const std::string text(1000, 'x');
+    for (const std::size_t cut : {0u, 1u, 127u, 128u, 129u, 1000u}) {
+        Hasher two;
+        two.add(text.substr(0, cut));
+        two.add(text.substr(cut));
+        CHECK(two.finish() == hash_text(text));
+    }
     CHECK(digest_from_hex(abc) == hash_text("abc"));
     CHECK_FALSE(digest_from_hex("xyz").has_value());
     CHECK_FALSE(digest_from_hex(abc.substr(1) + "g").has_value());

@@ -26,7 +26,7 @@ std::vector<std::filesystem::path> kept_inputs(std::string_view target) {
 }  // namespace
 
 TEST_CASE("every target lives through its seeds and through its kept corpus") {
-    const LogSink before = set_log_sink([](LogLevel, std::string_view) {});
+    const ScopedLogSink quiet([](LogLevel, std::string_view) {});
     for (const fuzz::FuzzTarget* target : fuzz::all_targets()) {
         CAPTURE(target->name);
         const auto seeds = target->seeds();
@@ -43,7 +43,6 @@ TEST_CASE("every target lives through its seeds and through its kept corpus") {
         }
         target->run("");
     }
-    set_log_sink(before);
 }
 
 TEST_CASE("each folder of the corpus belongs to a target") {

@@ -75,6 +75,33 @@ TEST_CASE("every counter, state and gauge has a line") {
     CHECK(has_line(text, "pathscope_heartbeat_seconds_count{id=\"1\",name=\"far\"} 1"));
 }
 
+TEST_CASE("what is a counter never falls, also when an audit takes light back") {
+    EventStore store;
+    store.count_all({{Counter::samples, 100}, {Counter::tiles, 2}}, ServerId{1});
+    store.take_back({{Counter::samples, 30}}, ServerId{1});
+    CHECK(store.total(Counter::samples) == 70);
+    CHECK(has_line(metrics_text(store, {}, {}), "pathscope_samples_total 100"));
+    store.count(Counter::samples, 5);
+    CHECK(has_line(metrics_text(store, {}, {}), "pathscope_samples_total 105"));
+    CHECK(has_line(metrics_text(store, {}, {}), "pathscope_tiles_total 2"));
+}
+
+TEST_CASE("the sum of a summary never falls: it is no rounded mean times a count") {
+    EventStore store;
+    ClusterFigures figures;
+    figures.living = {ServerId{1}};
+    const auto sum = [&] {
+        const std::string text = metrics_text(store, figures, {});
+        const std::string name = "pathscope_heartbeat_seconds_sum{id=\"1\",name=\"far\"} ";
+        const std::size_t at = text.find("\n" + name);
+        REQUIRE(at != std::string::npos);
+        return std::stod(text.substr(at + 1 + name.size()));
+    };
+    store.name_server(ServerId{1}, "far");
+    for (const TimeNs duration : {3, 3, 5, 0}) store.add_latency(Latency::heartbeat, duration, ServerId{1});
+    CHECK(1e9 * sum() == doctest::Approx(11));
+}
+
 TEST_CASE("a name cannot write lines of its own, and a crowd of servers not a page without end") {
     EventStore store;
     fill(store, 1000).name_server(ServerId{1}, "a\"} 1\nb\\");

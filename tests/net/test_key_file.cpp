@@ -131,7 +131,7 @@ TEST_CASE("a list is read again: a change counts when two looks agree on it") {
     CHECK(list->keys().size() == 2);
 
     int warnings = 0;
-    const LogSink before = set_log_sink([&](LogLevel, std::string_view) { ++warnings; });
+    const ScopedLogSink counting([&](LogLevel, std::string_view) { ++warnings; });
     TimeNs now = 1'000 * k_second_ns;
     const auto looks = [&](int times) {  // How many of so many looks saw a change.
         int changes = 0;
@@ -164,5 +164,4 @@ TEST_CASE("a list is read again: a change counts when two looks agree on it") {
     write(file, a.public_key + "\n");
     CHECK(looks(4) == 1);
     CHECK(list->keys() == std::vector{a.public_key});
-    set_log_sink(before);
 }

@@ -21,6 +21,10 @@ class RandomFields {
     void u64(std::string_view, std::uint64_t& value, std::uint64_t least, std::uint64_t most) {
         value = number(least, most);
     }
+    void optional_u32(std::string_view, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
+                      std::uint32_t) {
+        value = static_cast<std::uint32_t>(number(least, most));
+    }
     void time(std::string_view, TimeNs& value) { value = static_cast<TimeNs>(number(0, k_max_u64 >> 1)); }
     void text(std::string_view, std::string& value, std::size_t least, std::size_t most) {
         value.assign(number(least, most), static_cast<char>('!' + rng_.next_u32() % 90));

@@ -104,10 +104,13 @@ TEST_CASE("each field that is missing is named") {
     HashRng rng(1);
     for (const Message& message : one_of_each(rng)) {
         const Frames frames = encode(message);
-        for (const FieldInfo& field : message_fields(type_of(message)))
+        for (const FieldInfo& field : message_fields(type_of(message))) {
+            const bool optional = field.limits.find("absent") != std::string::npos;
+            const std::string sentence = "malformed: " + std::string(name_of(type_of(message))) +
+                                         ": field '" + field.name + "' is missing.";
             CHECK(refusal(message, with_header(frames, without(header_of(frames), field.name))) ==
-                  "malformed: " + std::string(name_of(type_of(message))) + ": field '" + field.name +
-                      "' is missing.");
+                  (optional ? "" : sentence));
+        }
     }
 }
 

@@ -16,28 +16,6 @@
 
 namespace pathscope::testing {
 
-/// All that is said while it lives.
-class Listener {
-  public:
-    Listener() {
-        before_ = set_log_sink([this](LogLevel level, std::string_view sentence) {
-            said.push_back((level == LogLevel::warning ? "warning: " : "note: ") + std::string(sentence));
-        });
-    }
-    ~Listener() { set_log_sink(before_); }
-    Listener(const Listener&) = delete;
-    Listener& operator=(const Listener&) = delete;
-
-    [[nodiscard]] int count(std::string_view part) const {
-        return int(std::count_if(said.begin(), said.end(),
-                                 [part](const auto& s) { return s.find(part) != std::string::npos; }));
-    }
-    std::vector<std::string> said;
-
-  private:
-    LogSink before_;
-};
-
 inline SceneFile scene_of(std::vector<std::string> objs) {
     SceneFile scene;
     scene.objs = std::move(objs);

@@ -59,21 +59,4 @@ inline Scene small_scene(std::vector<LightSpec> lights) {
     return small_scene(empty_parts(), std::move(lights));
 }
 
-/// Keeps what is logged instead of printing it, until the end of the scope.
-class LogCapture {
-  public:
-    LogCapture()
-        : before_(set_log_sink([this](LogLevel level, std::string_view sentence) {
-              (level == LogLevel::warning ? warnings : notes).emplace_back(sentence);
-          })) {}
-    ~LogCapture() { set_log_sink(std::move(before_)); }
-    LogCapture(const LogCapture&) = delete;
-    LogCapture& operator=(const LogCapture&) = delete;
-
-    std::vector<std::string> warnings, notes;
-
-  private:
-    LogSink before_;
-};
-
 }  // namespace pathscope::testing

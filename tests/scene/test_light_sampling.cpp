@@ -6,6 +6,7 @@
 #include "small_scenes.hpp"
 #include "statistics.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 using namespace pathscope;

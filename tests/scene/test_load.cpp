@@ -8,6 +8,7 @@
 #include "pathscope/core/files.hpp"
 #include "pathscope/image/io.hpp"
 
+#include "log_capture.hpp"
 #include "memory_files.hpp"
 #include "testing.hpp"
 
@@ -26,7 +27,7 @@ Material material_of(const std::string& statements, const SceneOptions& options 
                                {"a.mtl", "newmtl m\n" + statements}};
     SceneFile scene = more;
     scene.objs = {"a.obj"};
-    const Listener quiet;
+    const LogCapture quiet;
     const SceneParts parts = parts_of(scene, files, options);
     REQUIRE(parts.materials.size() == 1);
     return parts.materials[0];
@@ -59,7 +60,7 @@ TEST_CASE("a mtllib line names one file with blanks, or several") {
                                {"a b.mtl", "newmtl x\nKd 1 0 0\n"},
                                {"c.mtl", "newmtl x\n"},
                                {"d.mtl", "newmtl y\nKd 0 1 0\n"}};
-    const Listener listener;
+    const LogCapture listener;
     const SceneParts parts = parts_of(scene_of({"a.obj", "b.obj"}), files);
     CHECK(parts.materials[0].kd == Rgb{1, 0, 0});
     CHECK(parts.materials[1].kd == Rgb{0, 1, 0});
@@ -72,7 +73,7 @@ TEST_CASE("missing materials are grey, and said once") {
         {"lost.obj", "mtllib lost.mtl\nusemtl x\n" + triangle()},
         {"other.obj", "mtllib a.mtl\n" + triangle() + "usemtl x\nf 1 2 3\nusemtl y\nf 1 2 3\n"},
         {"a.mtl", "newmtl x\nKd 1 0 0\n"}};
-    const Listener listener;
+    const LogCapture listener;
     const SceneParts parts = parts_of(scene_of({"bare.obj", "lost.obj", "other.obj"}), files);
     REQUIRE(parts.materials.size() == 5);
     for (const std::size_t grey : {0, 1, 2, 4}) {
@@ -192,7 +193,7 @@ TEST_CASE("textures: found from the MTL, shared by name and usage, scaled by use
         {"o/m/t/red.tga", tga({0, 0, 255, 51})},
         {"o/m/t/blue.tga", tga({255, 0, 0})},
         {"blue.tga", tga({255, 0, 0})}};
-    const Listener listener;
+    const LogCapture listener;
     SceneFile scene = scene_of({"o/a.obj"});
     const SceneParts parts = parts_of(scene, files);
     CHECK(listener.said.empty());
@@ -233,7 +234,7 @@ TEST_CASE("a texture that is missing or broken is said once, and its materials d
                                 "no.png\nmap_Ks bad.png\nmap_Ke good.tga\n"},
                                {"bad.png", "this is no PNG"},
                                {"good.tga", tga({255, 255, 255})}};
-    const Listener listener;
+    const LogCapture listener;
     const SceneParts parts = parts_of(scene_of({"a.obj"}), files);
     CHECK(parts.textures.size() == 1);
     CHECK(parts.materials[0].kd == Rgb{0.5f, 0.5f, 0.5f});
@@ -250,7 +251,7 @@ TEST_CASE("triangles without area are left out, and counted in one warning for a
     testing::MemoryFiles files{{"a.obj", "mtllib a.mtl\nusemtl m\n" + triangle() + "f 1 1 2\nf 2 2 3\n"},
                                {"flat.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nf 1 2 1\n"},
                                {"a.mtl", "newmtl m\n"}};
-    const Listener listener;
+    const LogCapture listener;
     CHECK(parts_of(scene_of({"a.obj", "flat.obj"}), files).degenerate_triangles == 3);
     CHECK(listener.said == std::vector<std::string>{"warning: a.obj: 2 triangles without area left out.",
                                                     "warning: flat.obj: 1 triangle without area left out."});

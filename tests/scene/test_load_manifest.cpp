@@ -4,6 +4,7 @@
 
 #include "pathscope/scene/load.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 #include "scene/loading.hpp"
@@ -21,7 +22,7 @@ TEST_CASE("a scene loads into the same bits from a folder and from a manifest") 
           "newmtl m\nKd 0.3 0.3 0.3\nmap_Kd Maps\\RED.tga\nmap_Ks none.png\nKe 1 2 3\n");
     write(folder.path() / "maps" / "red.TGA", tga({1, 2, 200, 50}));
     write(folder.path() / "unrelated.txt", "private");
-    const Listener quiet;
+    const LogCapture quiet;
     const auto opened = open_scene(folder.path() / "room.obj", {});
     REQUIRE(opened);
 

@@ -4,6 +4,7 @@
 #include "pathscope/core/files.hpp"
 #include "pathscope/scene/load.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 #include "scene/loading.hpp"
@@ -23,7 +24,7 @@ TEST_CASE("the project's own scenes load, as far as their models are there") {
         REQUIRE_MESSAGE(scene, (scene ? "" : scene.error().message));
         const bool is_generated = entry.path().parent_path().filename() == "atrium";
         if (is_generated) continue;  // Its model is made by make-atrium, and large.
-        const Listener listener;
+        const LogCapture listener;
         const auto opened = open_scene(entry.path(), {});
         REQUIRE_MESSAGE(opened, (opened ? "" : opened.error().message));
         CHECK(listener.said.empty());
@@ -59,7 +60,7 @@ TEST_CASE("the shared scenes load: triangles, materials, textures") {
     for (const Case& c : cases) {
         if (testing::k_sanitized && c.triangles > 60'000) continue;
         CAPTURE(c.path);
-        const Listener listener;
+        const LogCapture listener;
         const auto opened = open_scene(folder / "scenes" / c.path, {});
         REQUIRE_MESSAGE(opened, (opened ? "" : opened.error().message));
         CHECK(opened->parts.mesh.triangles.size() + opened->parts.degenerate_triangles == c.triangles);

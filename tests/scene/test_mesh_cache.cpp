@@ -13,6 +13,7 @@
 #include "pathscope/scene/load.hpp"
 #include "pathscope/scene/mesh_cache.hpp"
 
+#include "log_capture.hpp"
 #include "memory_files.hpp"
 #include "testing.hpp"
 
@@ -23,22 +24,6 @@ using namespace pathscope::testing;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// What is said while it lives.
-class Listener {
-  public:
-    Listener() {
-        before_ = set_log_sink([this](LogLevel, std::string_view sentence) { said.emplace_back(sentence); });
-    }
-    ~Listener() { set_log_sink(before_); }
-    Listener(const Listener&) = delete;
-    Listener& operator=(const Listener&) = delete;
-
-    std::vector<std::string> said;
-
-  private:
-    LogSink before_;
-};
 
 constexpr MeshCacheLimits k_any_size{.least_obj_bytes = 0};
 
@@ -107,7 +92,7 @@ TEST_CASE("a scene is the same without a cache, when the cache is filled, and fr
     const TemporaryFolder folder;
     const MeshCache cache(folder.path(), k_any_size);
     for (const bool smoothing : {true, false}) {
-        const Listener quiet;
+        const LogCapture quiet;
         const SceneParts parsed = load(k_obj, std::nullopt, smoothing);
         check_same(load(k_obj, cache, smoothing), parsed);
         check_same(load(k_obj, cache, smoothing), parsed);
@@ -117,7 +102,7 @@ TEST_CASE("a scene is the same without a cache, when the cache is filled, and fr
     // It is the cache that answers: what lies there under the key is what comes.
     const ObjModel other = model_of("v 0 0 0\nv 7 0 0\nv 0 7 0\nf 1 2 3\n");
     cache.store(MeshCache::key_of(hash_text(k_obj), true), other);
-    const Listener quiet;
+    const LogCapture quiet;
     CHECK(load(k_obj, cache).mesh.positions == other.mesh.positions);
     CHECK(load(k_obj, cache, false).mesh.triangles.size() == 8);
 }
@@ -130,7 +115,7 @@ TEST_CASE("files of a folder and of a manifest use one cached mesh") {
     SceneFile scene;
     scene.objs = {"a.obj"};
     DiskFiles disk(folder.path());
-    const Listener quiet;
+    const LogCapture quiet;
     const auto at_client = load_scene_parts(scene, disk, {}, cache);
     REQUIRE(at_client);
 
@@ -146,7 +131,7 @@ TEST_CASE("files of a folder and of a manifest use one cached mesh") {
 TEST_CASE("a damaged file of the cache is mentioned, replaced, and never changes what is loaded") {
     const TemporaryFolder folder;
     const MeshCache cache(folder.path(), k_any_size);
-    std::optional<Listener> quiet(std::in_place);
+    std::optional<LogCapture> quiet(std::in_place);
     const SceneParts parsed = load(k_obj, cache);
     const fs::path path = cache.path_of(MeshCache::key_of(hash_text(k_obj), true));
     const std::string good = *read_file(path);
@@ -154,7 +139,7 @@ TEST_CASE("a damaged file of the cache is mentioned, replaced, and never changes
 
     const auto check_refused = [&](const std::string& bad) {
         write(path, bad);
-        Listener listener;
+        LogCapture listener;
         check_same(load(k_obj, cache), parsed);
         const auto mentions = std::count_if(
             listener.said.begin(), listener.said.end(),
@@ -189,7 +174,7 @@ TEST_CASE("a mesh that could not have been parsed is refused even if its seal is
         ObjModel model = model_of(k_obj);
         spoil(model);
         cache.store(key, model);
-        const Listener listener;
+        const LogCapture listener;
         return !cache.find(key) && listener.said.size() == 1;
     };
     CHECK_FALSE(refuses([](ObjModel&) {}));
@@ -210,7 +195,7 @@ TEST_CASE("counts in a file that promise more than it holds are refused before a
     const auto find_sealed = [&](const std::string& payload) {
         const Digest seal = hash_text(std::string(key_text) + payload);
         write(cache.path_of(key), std::string(seal.begin(), seal.end()) + payload);
-        const Listener quiet;
+        const LogCapture quiet;
         return cache.find(key);
     };
     cache.store(key, model_of(k_obj));
@@ -237,7 +222,7 @@ TEST_CASE("the key depends on the bytes and on smoothing") {
 
 TEST_CASE("small OBJ files are not cached, nor what is larger than the whole cache") {
     const TemporaryFolder folder;
-    const Listener quiet;
+    const LogCapture quiet;
     (void)load(k_obj, MeshCache(folder.path(), {.least_obj_bytes = k_obj.size() + 1}));
     (void)load(k_obj, MeshCache(folder.path(), {.most_bytes = 100, .least_obj_bytes = 0}));
     CHECK(files_in(folder.path()).empty());
@@ -276,7 +261,7 @@ TEST_CASE("what was not used for the longest time goes first, and nothing that i
 TEST_CASE("where the cache cannot be written to, loading goes on and says so") {
     const TemporaryFolder folder;
     write(folder.path() / "file", "in the way");
-    Listener listener;
+    LogCapture listener;
     const SceneParts parsed = load(k_obj, std::nullopt);
     listener.said.clear();
     check_same(load(k_obj, MeshCache(folder.path() / "file" / "folder", k_any_size)), parsed);

@@ -2,6 +2,7 @@
 
 #include "pathscope/scene/load.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 #include "scene/loading.hpp"
@@ -14,7 +15,7 @@ TEST_CASE("a bare OBJ gets a camera that sees it and, where nothing emits, a sky
     write(folder.path() / "dark.obj", triangle("mtllib a.mtl\nusemtl dark\n"));
     write(folder.path() / "bright.OBJ", triangle("mtllib a.mtl\nusemtl bright\n"));
     write(folder.path() / "a.mtl", "newmtl dark\nKd 1 1 1\nnewmtl bright\nKe 1 1 1\n");
-    const Listener listener;
+    const LogCapture listener;
     const auto dark = open_scene(folder.path() / "dark.obj", {});
     REQUIRE(dark);
     CHECK(dark->file.name == "dark");
@@ -41,7 +42,7 @@ TEST_CASE("a bare OBJ that a scene.json beside it names takes camera and lights 
         {"name": "a", "position": [0, 0, 1], "look_at": [0, 0, 0]},
         {"name": "b", "position": [0, 0, 2], "look_at": [0, 0, 0]}], "variants": {"variant.obj": "b"},
         "lights": [{"type": "sky", "radiance": [2, 2, 2]}], "materials": {"m": {"kd": [0.25, 0, 0]}}})");
-    const Listener listener;
+    const LogCapture listener;
     const auto own = open_scene(folder.path() / "own.obj", {});
     const auto variant = open_scene(folder.path() / "variant.obj", {});
     const auto other = open_scene(folder.path() / "other.obj", {});
@@ -68,7 +69,7 @@ TEST_CASE("open_scene refuses what is no scene, in a sentence") {
     write(folder.path() / "bad.json", "{\"obj\": 1}");
     write(folder.path() / "lost.json", "{\"obj\": \"none.obj\"}");
     write(folder.path() / "latin\xe9.obj", triangle());
-    const Listener quiet;
+    const LogCapture quiet;
     const auto message = [&](const char* name) {
         const auto opened = open_scene(folder.path() / name, {});
         REQUIRE_FALSE(opened);

@@ -7,6 +7,7 @@
 #include "pathscope/scene/surface.hpp"
 #include "small_scenes.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 using namespace pathscope;

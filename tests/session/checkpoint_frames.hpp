@@ -98,7 +98,8 @@ class MadeUpFrame {
   private:
     std::optional<Lease> grant(LightPart part, ServerId server) {
         if (part == LightPart::direct) return work.grant_direct(0);
-        return work.grant_indirect(server, 0, [](const Round&, std::uint32_t) { return k_second_ns; });
+        return work.grant_indirect(server, 0, 1 + server.value % 3,
+                                   [](const Round&, std::uint32_t) { return k_second_ns; });
     }
     void commit(LightPart part, const Lease& lease) {
         const Round round = work.round_of(lease);

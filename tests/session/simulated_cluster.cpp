@@ -53,10 +53,34 @@ void SimulatedCluster::start_client() {
     clients_.push_back(std::make_unique<Client>(*this, std::move(state), ++sessions_));
     client_ = clients_.back().get();
     last_progress_ = time_.now();
-    // What the one before sent is heard first.
     for (const auto& server : servers_)
-        time_.at(std::max({time_.now(), server->parted_until(), server->from_client[1].last_arrival}) + 1,
-                 [&server = *server] { server.when_awake([&server] { server.connection_lost(); }); });
+        if (server->relay() == k_no_relay) tell_lost(*server);
+    for (const auto& relay : relays_)
+        if (relay->relay() == k_no_relay) tell_lost(*relay);
+}
+
+/// The process at the other end is gone. What it sent is heard first.
+void SimulatedCluster::tell_lost(Dialler& who) {
+    time_.at(std::max({time_.now(), who.parted_until(), who.from_client[1].last_arrival}) + 1,
+             [&who] { who.when_awake([&who] { who.connection_lost(); }); });
+}
+
+void SimulatedCluster::start_relay(int number, int relay) {
+    auto started = std::make_unique<Relay>(*this, number, relay);
+    if (number == int(relays_.size())) return relays_.push_back(std::move(started));
+    std::swap(relays_[std::size_t(number)], started);
+    dead_relays_.push_back(std::move(started));
+    for (const auto& server : servers_)
+        if (server->relay() == number) tell_lost(*server);
+    for (const auto& other : relays_)
+        if (other->relay() == number) tell_lost(*other);
+}
+
+void SimulatedCluster::publish(int relay, const Frames& frames) {
+    for (const auto& server : servers_)
+        if (server->relay() == relay) (void)to_server(Channel::input, server->instance(), frames);
+    for (const auto& other : relays_)
+        if (other->relay() == relay) (void)to_server(Channel::input, other->instance(), frames);
 }
 
 /// What happened to a client that is about to end.
@@ -74,7 +98,9 @@ void SimulatedCluster::count_client() {
 void SimulatedCluster::start_server() {
     const double speed = settings_.samples_per_second * std::exp2(6 * uniform() - 3);
     const bool differs = settings_.differing > 0 && chance(settings_.differing);
-    servers_.push_back(std::make_unique<Server>(*this, std::uint32_t(servers_.size() + 1), speed, differs));
+    const int relay = relays_.empty() || chance(0.2) ? k_no_relay : int(rng_.next_u32() % relays_.size());
+    servers_.push_back(
+        std::make_unique<Server>(*this, std::uint32_t(servers_.size() + 1), speed, differs, relay));
 }
 
 void SimulatedCluster::plan_hang(TimeNs at, TimeNs duration) {
@@ -85,9 +111,9 @@ void SimulatedCluster::plan_hang(TimeNs at, TimeNs duration) {
 }
 
 template <class Arrive>
-void SimulatedCluster::transmit(Wire& wire, Server& server, Frames frames, Arrive arrive) {
+void SimulatedCluster::transmit(Wire& wire, Dialler& dialler, Frames frames, Arrive arrive) {
     ++totals_.messages;
-    if (server.parted()) {
+    if (dialler.parted()) {
         ++totals_.parted;
         return;
     }
@@ -123,26 +149,33 @@ Frames SimulatedCluster::damaged(Frames frames) {
     return frames;
 }
 
-void SimulatedCluster::to_client(Server& server, Channel channel, Frames frames) {
-    const auto arrive = [this, channel, instance = server.instance(),
-                         sender = server.sender()](const Frames& arrived) {
-        client_->when_awake([=, this] { client_->receive(instance, channel, arrived, sender); });
+/// Or to the relay that it dials.
+void SimulatedCluster::to_client(Dialler& dialler, Channel channel, Frames frames) {
+    const auto arrive = [this, channel, relay = dialler.relay(), instance = dialler.instance(),
+                         sender = dialler.sender()](const Frames& arrived) {
+        if (relay == k_no_relay)
+            return client_->when_awake([=, this] { client_->receive(instance, channel, arrived, sender); });
+        Relay* const there = relays_[std::size_t(relay)].get();
+        there->when_awake([=] { there->receive(instance, channel, arrived, sender); });
     };
-    transmit(server.from_server[int(channel)], server, std::move(frames), arrive);
+    transmit(dialler.from_server[int(channel)], dialler, std::move(frames), arrive);
 }
 
 bool SimulatedCluster::to_server(Channel channel, const std::string& instance, Frames frames) {
-    const auto found = std::find_if(servers_.begin(), servers_.end(),
-                                    [&](const auto& server) { return server->reachable_as(instance); });
-    if (found == servers_.end()) {
+    const auto is_it = [&](const auto& dialler) { return dialler->reachable_as(instance); };
+    Dialler* dialler = nullptr;
+    if (const auto server = std::find_if(servers_.begin(), servers_.end(), is_it); server != servers_.end())
+        dialler = server->get();
+    else if (const auto relay = std::find_if(relays_.begin(), relays_.end(), is_it); relay != relays_.end())
+        dialler = relay->get();
+    if (!dialler) {
         ++totals_.unreachable;
         return false;
     }
-    Server* const server = found->get();
-    const auto arrive = [server, channel, instance](const Frames& arrived) {
-        server->when_awake([=] { server->receive(instance, channel, arrived); });
+    const auto arrive = [dialler, channel, instance](const Frames& arrived) {
+        dialler->when_awake([=] { dialler->receive(instance, channel, arrived); });
     };
-    transmit(server->from_client[int(channel)], *server, std::move(frames), arrive);
+    transmit(dialler->from_client[int(channel)], *dialler, std::move(frames), arrive);
     return true;
 }
 
@@ -191,6 +224,7 @@ void SimulatedCluster::strike() {
         ++totals_.joins;
         return start_server();
     }
+    if (!relays_.empty() && chance(0.2)) return strike_relay();
     if (servers_.empty()) return;
     Server& server = *servers_[rng_.next_u32() % servers_.size()];
     if (!server.runs()) return;
@@ -200,9 +234,7 @@ void SimulatedCluster::strike() {
         ++totals_.kills;
         server.kill();
         // Its connections close, and that is told soon; unless the cable is cut as well.
-        if (!server.parted())
-            time_.at(time_.now() + soon(0.005),
-                     [this] { client_->when_awake([this] { client_->connection_lost(); }); });
+        if (!server.parted()) hang_up(server.relay());
     } else if (kind < 0.5) {
         ++totals_.freezes;
         server.freeze(until);
@@ -218,16 +250,58 @@ void SimulatedCluster::strike() {
     }
 }
 
+/// The client, or a relay, is told soon that some connection ended.
+void SimulatedCluster::hang_up(int relay) {
+    time_.at(time_.now() + soon(0.005), [this, relay] {
+        if (relay == k_no_relay) return client_->when_awake([this] { client_->connection_lost(); });
+        Relay* const there = relays_[std::size_t(relay)].get();
+        there->when_awake([there] { there->server_lost(); });
+    });
+}
+
+/// A relay that died or left is started again before long.
+void SimulatedCluster::strike_relay() {
+    Relay& relay = *relays_[rng_.next_u32() % relays_.size()];
+    if (!relay.runs()) return;
+    ++totals_.relay_faults;
+    const double kind = uniform();
+    const TimeNs until = std::min(time_.now() + soon(10), settings_.calm_at);
+    if (kind < 0.3) return relay.pause(until - time_.now());
+    if (kind < 0.6) return relay.part(until);
+    if (kind < 0.8) {
+        relay.kill();
+        if (!relay.parted()) hang_up(relay.relay());
+    } else {
+        relay.when_awake([&relay] { relay.drain(); });
+    }
+    time_.at(time_.now() + soon(2), [this, &relay] { restart_relay(relay); });
+}
+
+void SimulatedCluster::restart_relay(Relay& relay) {
+    if (relay.runs())  // It drains.
+        return time_.at(time_.now() + 100 * k_millisecond_ns, [this, &relay] { restart_relay(relay); });
+    start_relay(relay.number(), relay.relay());
+}
+
 TimeNs SimulatedCluster::end_of_bans(TimeNs after) const {
     TimeNs end = 0;
-    for (const auto& server : servers_)
-        if (const auto ban = client_->machine().conduct().ban_of(server->conduct_name(), after))
+    const auto look = [&](const Dialler& dialler) {
+        const ClientMachine* const host =
+            dialler.relay() == k_no_relay ? &client_->machine()
+                                          : relays_[std::size_t(dialler.relay())]->relay_machine().below();
+        if (!host) return;
+        if (const auto ban = host->conduct().ban_of(dialler.conduct_name(), after))
             end = std::max(end, ban->until);
+    };
+    for (const auto& server : servers_) look(*server);
+    for (const auto& relay : relays_) look(*relay);
     return end;
 }
 
 std::string SimulatedCluster::run() {
     start_client();
+    for (int i = 0; i < settings_.relays; ++i)
+        start_relay(i, i > 0 && chance(0.3) ? int(rng_.next_u32() % std::uint32_t(i)) : k_no_relay);
     for (int i = 0; i < settings_.servers; ++i) start_server();
     plan_faults();
 

@@ -1,10 +1,10 @@
 #pragma once
 /// A client and N servers in virtual time: the real state machines, every message encoded and decoded, over a network that
 /// delays, loses, doubles, damages and parts, with processes that die, freeze, drain, come and start again. Everything
-/// follows from the seed.
+/// follows from the seed. In a share of the worlds relays stand between some of the servers and the client, or another relay.
 ///
 /// After every event:
-///   the ledger's audit holds: each round is counted at most once, no lease is lost (cluster/ledger.hpp);
+///   the ledger's audit holds: each round is counted at most once, no lease is lost (cluster/ledger.hpp); so does each relay's;
 ///   each block's indirect light is that of its committed rounds, to the last bit;
 ///   while work is left and somebody could do it, rounds are committed;
 ///   what waits at a server is bounded by its credits;
@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "pathscope/session/client_machine.hpp"
+#include "pathscope/session/relay_machine.hpp"
 #include "pathscope/session/server_machine.hpp"
 
 #include "simulated_renderer.hpp"
@@ -31,8 +32,10 @@ struct ClusterSettings {
     std::uint32_t seed = 0;
     int servers = 4;
     int most_servers = 8;  ///< Joins stop here.
+    int relays = 0;        ///< Most servers are behind one, then.
     int width = 12, height = 8, block = 4;
     std::uint32_t spp = 6, direct_spp = 2, round_samples = 2;
+    TimeNs lease_time = k_lease_time;
     ScheduleKind schedule = ScheduleKind::pull;
     DetectorKind detector = DetectorKind::adaptive;
     int min_servers = 0;
@@ -60,10 +63,11 @@ struct ClusterTotals {
     std::uint64_t lost = 0, doubled = 0, damaged = 0, parted = 0, unreachable = 0;
     std::uint64_t kills = 0, freezes = 0, partitions = 0, hangs = 0, drains = 0, joins = 0, pauses = 0,
                   restarts = 0, new_states = 0;
-    std::uint64_t stuck = 0;          ///< Servers seen to be so.
-    std::uint64_t refused_bits = 0;   ///< Servers of other bits that were turned away.
-    std::uint64_t marked_images = 0;  ///< For rounds of those that were admitted.
-    std::uint64_t most_leases = 0;    ///< Of one server at once.
+    std::uint64_t stuck = 0;                      ///< Servers seen to be so.
+    std::uint64_t refused_bits = 0;               ///< Servers of other bits that were turned away.
+    std::uint64_t marked_images = 0;              ///< For rounds of those that were admitted.
+    std::uint64_t relay_faults = 0, relayed = 0;  ///< Of relays; rounds that came by them.
+    std::uint64_t most_leases = 0;                ///< Of one server at once.
     std::uint64_t bad_messages = 0, deaths = 0, bans = 0;
     std::uint64_t lies = 0, audited = 0, unmasked = 0, undone = 0, failures = 0;
     LedgerCounts ledger;
@@ -87,7 +91,10 @@ class SimulatedCluster {
 
   private:
     class Client;
+    class Dialler;
     class Server;
+    class Relay;
+    static constexpr int k_no_relay = -1;
 
     // The world.
     [[nodiscard]] double uniform() { return rng_.next_float(); }
@@ -97,6 +104,12 @@ class SimulatedCluster {
     [[nodiscard]] std::string new_instance();
     void start_client();
     void start_server();
+    void start_relay(int number, int relay);
+    void strike_relay();
+    void restart_relay(Relay& relay);
+    void hang_up(int relay);
+    void tell_lost(Dialler& who);
+    void publish(int relay, const Frames& frames);
     void plan_faults();
     void move_camera();
     void strike();
@@ -106,9 +119,9 @@ class SimulatedCluster {
         TimeNs last_arrival = 0;
     };
     template <class Arrive>
-    void transmit(Wire& wire, Server& server, Frames frames, Arrive arrive);
+    void transmit(Wire& wire, Dialler& dialler, Frames frames, Arrive arrive);
     [[nodiscard]] Frames damaged(Frames frames);
-    void to_client(Server& server, Channel channel, Frames frames);
+    void to_client(Dialler& dialler, Channel channel, Frames frames);
     [[nodiscard]] bool to_server(Channel channel, const std::string& instance, Frames frames);
 
     // The oracle.
@@ -119,7 +132,10 @@ class SimulatedCluster {
     void check_end();
     void check_marks();
     void count_client();
+    void check_dialler(const Dialler& dialler);
     [[nodiscard]] bool may_serve(const Server& server) const;
+    [[nodiscard]] bool can_be_reached(const Dialler& dialler) const;
+    [[nodiscard]] bool stands_for_somebody(int relay) const;
     void check_light();
     void check_accounts();
     void check_picture(LightPart part, const FrameSums& sums, std::uint32_t spp);
@@ -142,7 +158,9 @@ class SimulatedCluster {
     std::vector<std::unique_ptr<Client>> clients_;  ///< Dead ones are kept: events may still name them.
     Client* client_ = nullptr;                      ///< The one that lives.
     std::vector<std::unique_ptr<Server>> servers_;
-    std::uint64_t committed_ = 0;  ///< Of the client's present epoch, when it last rose.
+    std::vector<std::unique_ptr<Relay>> relays_;       ///< By number.
+    std::vector<std::unique_ptr<Relay>> dead_relays_;  ///< Events may still name them.
+    std::uint64_t committed_ = 0;                      ///< Of the client's present epoch, when it last rose.
     TimeNs last_progress_ = 0;
     TimeNs millisecond_ = 0;
     std::uint64_t events_before_ = 0;

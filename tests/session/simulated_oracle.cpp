@@ -26,7 +26,25 @@ bool SimulatedCluster::done() const {
 }
 
 bool SimulatedCluster::may_serve(const Server& server) const {
-    return settings_.relaxed || !server.differs();
+    return (settings_.relaxed && server.relay() == k_no_relay) || !server.differs();
+}
+
+/// Whether messages get through, over all relays in between.
+bool SimulatedCluster::can_be_reached(const Dialler& dialler) const {
+    if (!dialler.runs() || dialler.frozen() || dialler.parted() || dialler.draining()) return false;
+    return dialler.relay() == k_no_relay || can_be_reached(*relays_[std::size_t(dialler.relay())]);
+}
+
+/// At the end, when all that live can be reached.
+bool SimulatedCluster::stands_for_somebody(int relay) const {
+    return std::any_of(servers_.begin(), servers_.end(),
+                       [&](const auto& server) {
+                           return server->relay() == relay && server->runs() && !server->draining() &&
+                                  may_serve(*server);
+                       }) ||
+           std::any_of(relays_.begin(), relays_.end(), [&](const auto& other) {
+               return other->relay() == relay && stands_for_somebody(other->number());
+           });
 }
 
 bool SimulatedCluster::someone_can_work() const {
@@ -34,8 +52,7 @@ bool SimulatedCluster::someone_can_work() const {
     // A client that waits for servers works as soon as one is there; the others carry on alone.
     const bool waits = client_->machine().progress().waiting;
     return !waits || std::any_of(servers_.begin(), servers_.end(), [this](const auto& server) {
-        return server->runs() && !server->frozen() && !server->parted() && !server->draining() &&
-               may_serve(*server);
+        return can_be_reached(*server) && may_serve(*server);
     });
 }
 
@@ -43,16 +60,26 @@ void SimulatedCluster::check_all() {
     const FrameWork& work = client_->machine().work();
     if (const auto audit = work.indirect_ledger().audit(); !audit) fail(audit.error().message);
     for (const auto& server : servers_) {
-        totals_.most_leases = std::max<std::uint64_t>(totals_.most_leases, server->machine().leases());
-        if (server->machine().leases() > k_most_credits ||
-            server->machine().unsent_answers() > 2 * k_most_credits)
-            fail(fmt::format("a server holds {} leases and {} unsent answers", server->machine().leases(),
-                             server->machine().unsent_answers()));
+        check_dialler(*server);
         if (server->machine().welcomed() && !may_serve(*server)) fail("a server of other bits was admitted");
     }
-    if (totals_.hangs == 0 && client_->store().total(Counter::stuck) > 0)
+    for (const auto& relay : relays_) {
+        check_dialler(*relay);
+        if (const auto audit = relay->relay_machine().work().audit(); !audit) fail(audit.error().message);
+        if (relay->relay_machine().work().leases() > k_most_credits) fail("a relay holds too many leases");
+    }
+    // A relay whose servers have all fallen silent is stuck, until it finds out.
+    if (totals_.hangs == 0 && relays_.empty() && client_->store().total(Counter::stuck) > 0)
         fail("an honest server is called stuck");
     check_progress();
+}
+
+void SimulatedCluster::check_dialler(const Dialler& dialler) {
+    const ServerMachine& machine = dialler.machine();
+    totals_.most_leases = std::max<std::uint64_t>(totals_.most_leases, machine.leases());
+    if (machine.leases() > k_most_credits || machine.unsent_answers() > 2 * k_most_credits)
+        fail(fmt::format("{} holds {} leases and {} unsent answers", dialler.name(), machine.leases(),
+                         machine.unsent_answers()));
 }
 
 /// A timer that is always due is a process that takes a core and does nothing.
@@ -141,10 +168,18 @@ void SimulatedCluster::check_end() {
     for (const auto& server : servers_)
         if (server->runs() && !server->draining()) {
             if (!may_serve(*server)) fail("a server of other bits goes on though it was refused");
-            ++alive;
+            alive += server->relay() == k_no_relay;
             if (server->machine().working_on() != wanted)
-                fail("a server does not hold the client's state at the end");
+                fail(fmt::format("{} does not hold the client's state at the end", server->name()));
         }
+    for (const auto& relay : relays_) {
+        const bool works = stands_for_somebody(relay->number());
+        alive += works && relay->relay() == k_no_relay;
+        totals_.relayed += relay->relay_machine().work().rounds_committed();
+        if (relay->machine().working_on() != (works ? std::optional(wanted) : std::nullopt))
+            fail(fmt::format("{} {} the client's state at the end", relay->name(),
+                             works ? "does not hold" : "stands for nobody and holds"));
+    }
     if (machine.progress().servers_ready != alive)
         fail(fmt::format("{} servers are alive at the end, and the client would give work to {}", alive,
                          machine.progress().servers_ready));
@@ -153,18 +188,18 @@ void SimulatedCluster::check_end() {
 
 /// The image is marked if, and only if, a round of a server of other bits is in it.
 void SimulatedCluster::check_marks() {
-    std::uint64_t tiles = 0;
+    std::uint64_t rounds = 0;
     for (const auto& server : servers_)
         if (server->differs()) {
             totals_.refused_bits += server->machine().refusal().has_value();
-            tiles += client_->tiles_of(server->name());
+            rounds += client_->rounds_of(server->name());
         }
     const std::uint64_t marked = client_->machine().differing_rounds();
     totals_.marked_images += marked > 0;
-    if (!settings_.relaxed && tiles > 0) fail("a round of a server of other bits was taken");
+    if (!settings_.relaxed && rounds > 0) fail("a round of a server of other bits was taken");
     const bool one_state = client_->machine().epoch() == Epoch{1};
-    if (marked > tiles || (one_state && marked != tiles))
-        fail(fmt::format("{} rounds are marked, and {} came from servers of other bits", marked, tiles));
+    if (marked > rounds || (one_state && marked != rounds))
+        fail(fmt::format("{} rounds are marked, and {} came from servers of other bits", marked, rounds));
 }
 
 }  // namespace pathscope::testing

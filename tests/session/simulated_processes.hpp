@@ -88,15 +88,14 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
     [[nodiscard]] const ClientMachine& machine() const { return machine_; }
     [[nodiscard]] const EventStore& store() const { return store_; }
     /// Results that were merged, of the servers of that name.
-    [[nodiscard]] std::uint64_t tiles_of(std::string_view name) const {
-        std::uint64_t tiles = 0;
+    [[nodiscard]] std::uint64_t rounds_of(std::string_view name) const {
+        std::uint64_t rounds = 0;
         for (const ServerSummary& server : store_.servers())
-            if (server.name == name) tiles += server.total(Counter::tiles);
-        return tiles;
+            if (server.name == name) rounds += server.total(Counter::rounds_committed);
+        return rounds;
     }
 
-  private:
-    static ClientConfig config(const ClusterSettings& settings) {
+    [[nodiscard]] static ClientConfig config(const ClusterSettings& settings) {
         ClientConfig config;
         config.listens = true;
         config.min_servers = settings.servers > 0 ? settings.min_servers : 0;
@@ -105,12 +104,14 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
         config.relaxed = settings.relaxed;
         config.block_size = settings.block;
         config.round_samples = settings.round_samples;
+        config.lease_time = settings.lease_time;
         config.audit = {settings.audit, settings.seed};
         config.conduct.first_ban = 4 * k_second_ns;  // So that bans end while there is work.
         config.conduct.longest_ban = 20 * k_second_ns;
         return config;
     }
 
+  private:
     bool send(Channel channel, const std::string& instance, Frames frames) override {
         return cluster_.to_server(channel, instance, std::move(frames));
     }
@@ -127,13 +128,59 @@ class SimulatedCluster::Client : public Process, private ClientWorld {
     ClientMachine machine_;
 };
 
-/// The same of a server.
-class SimulatedCluster::Server : public Process, private ServerWorld {
+/// Whoever dials, with its line: a server or a relay.
+class SimulatedCluster::Dialler : public Process {
   public:
-    Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second, bool differs)
-        : Process(cluster.time_),
-          cluster_(cluster),
-          name_(fmt::format("server-{}", pid)),
+    Dialler(SimulatedCluster& cluster, std::string name, int relay)
+        : Process(cluster.time_), cluster_(cluster), name_(std::move(name)), relay_(relay) {}
+
+    virtual void receive(const std::string& instance, Channel channel, Frames frames) = 0;
+    virtual void connection_lost() = 0;
+    [[nodiscard]] virtual const ServerMachine& machine() const = 0;
+
+    void part(TimeNs until) { parted_until_ = std::max(parted_until_, until); }
+    [[nodiscard]] TimeNs parted_until() const { return parted_until_; }
+    [[nodiscard]] bool parted() const { return time_.now() < parted_until_; }
+    [[nodiscard]] bool draining() const { return draining_; }
+    [[nodiscard]] const std::string& name() const { return name_; }
+    [[nodiscard]] int relay() const { return relay_; }  ///< That it dials, by number; none: the client.
+    [[nodiscard]] bool reachable_as(const std::string& instance) const {
+        return runs() && instance == instance_ && machine().linked();
+    }
+    [[nodiscard]] const std::string& instance() const { return instance_; }
+    [[nodiscard]] Sender sender() const { return {"", "10.0.0.1"}; }
+    [[nodiscard]] std::string conduct_name() const {
+        return pathscope::conduct_name("", name_, sender().address);
+    }
+
+    Wire from_client[3], from_server[3];
+
+  protected:
+    void dial(ServerMachine& machine) {
+        instance_ = cluster_.new_instance();
+        const std::string instance = instance_;
+        time_.at(time_.now() + 20 * k_millisecond_ns, [this, instance, &machine] {
+            when_awake([this, instance, &machine] {
+                if (instance == instance_) machine.on_linked(instance, time_.now());
+            });
+        });
+    }
+
+    SimulatedCluster& cluster_;
+    std::string name_;
+    std::string instance_;
+    bool draining_ = false;
+
+  private:
+    int relay_;
+    TimeNs parted_until_ = 0;
+};
+
+/// The same of a server.
+class SimulatedCluster::Server : public Dialler, private ServerWorld {
+  public:
+    Server(SimulatedCluster& cluster, std::uint32_t pid, double samples_per_second, bool differs, int relay)
+        : Dialler(cluster, fmt::format("server-{}", pid), relay),
           differs_(differs),
           machine_({name_, "0", differs ? bits_of_another() : own_bits(), 1, pid, "client"}, SceneCache({}),
                    *this),
@@ -143,37 +190,22 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
               misrender(outcome);
               when_awake([this, outcome]() mutable { machine_.on_outcome(outcome, time_.now()); });
           }) {
-        dial();
+        dial(machine_);
     }
 
-    void receive(const std::string& instance, Channel channel, Frames frames) {
+    void receive(const std::string& instance, Channel channel, Frames frames) override {
         if (instance == instance_ && machine_.linked())
             machine_.on_message(std::move(frames), channel, time_.now());
     }
-    void connection_lost() { machine_.on_connection_lost(time_.now()); }
+    void connection_lost() override { machine_.on_connection_lost(time_.now()); }
     /// SIGTERM.
     void drain() {
         if (std::exchange(draining_, true)) return;
         machine_.drain(time_.now());
     }
-    void part(TimeNs until) { parted_until_ = std::max(parted_until_, until); }
-    [[nodiscard]] TimeNs parted_until() const { return parted_until_; }
-    [[nodiscard]] bool parted() const { return time_.now() < parted_until_; }
-    [[nodiscard]] bool draining() const { return draining_; }
     [[nodiscard]] bool differs() const { return differs_; }
-    [[nodiscard]] const std::string& name() const { return name_; }
     void hang(TimeNs until) { renderer_.hang(until); }
-    [[nodiscard]] bool reachable_as(const std::string& instance) const {
-        return runs() && instance == instance_ && machine_.linked();
-    }
-    [[nodiscard]] const std::string& instance() const { return instance_; }
-    [[nodiscard]] Sender sender() const { return {"", "10.0.0.1"}; }
-    [[nodiscard]] std::string conduct_name() const {
-        return pathscope::conduct_name("", name_, sender().address);
-    }
-    [[nodiscard]] const ServerMachine& machine() const { return machine_; }
-
-    Wire from_client[3], from_server[3];
+    [[nodiscard]] const ServerMachine& machine() const override { return machine_; }
 
   private:
     /// One bit of the light, and nothing else: sizes and hashes are right.
@@ -190,14 +222,6 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
                                                               << cluster_.rng_.next_u32() % 16;
         }
     }
-    void dial() {
-        instance_ = cluster_.new_instance();
-        const std::string instance = instance_;
-        time_.at(time_.now() + 20 * k_millisecond_ns, [this, instance] {
-            when_awake([this, instance] { machine_.on_linked(instance, time_.now()); });
-        });
-    }
-
     bool send(Channel channel, Frames&& frames) override {
         cluster_.to_client(*this, channel, std::move(frames));
         return true;
@@ -225,24 +249,93 @@ class SimulatedCluster::Server : public Process, private ServerWorld {
         machine_.on_timers(time_.now());
         if (draining_ && machine_.linked() && machine_.drained()) machine_.say_goodbye(time_.now());
         if (machine_.ended() || (draining_ && machine_.drained())) return kill();
-        if (was_linked && !machine_.linked()) dial();
+        if (was_linked && !machine_.linked()) dial(machine_);
     }
     [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
 
-    SimulatedCluster& cluster_;
-    std::string name_;
     bool differs_;
-    std::string instance_;
-    bool draining_ = false;
-    TimeNs parted_until_ = 0;
     ServerMachine machine_;
     bool is_liar_, is_incapable_;
     SimulatedRenderer renderer_;
 };
 
-inline void SimulatedCluster::Client::publish(Frames frames) {
-    for (const auto& server : cluster_.servers_)
-        (void)cluster_.to_server(Channel::input, server->instance(), frames);
-}
+/// The same of a relay: it dials, and is dialled.
+class SimulatedCluster::Relay : public Dialler, private RelayWorld {
+  public:
+    Relay(SimulatedCluster& cluster, int number, int relay)
+        : Dialler(cluster, fmt::format("relay-{}", number), relay),
+          number_(number),
+          machine_({name_, "0", own_bits(), 1, std::uint32_t(number), "client"}, SceneCache({}),
+                   Client::config(cluster.settings_), ++cluster.sessions_, store_, *this) {
+        settle();
+    }
+
+    // Above.
+    void receive(const std::string& instance, Channel channel, Frames frames) override {
+        if (instance == instance_ && machine_.above().linked())
+            machine_.above().on_message(std::move(frames), channel, time_.now());
+    }
+    void connection_lost() override { machine_.above().on_connection_lost(time_.now()); }
+    void drain() {
+        if (std::exchange(draining_, true)) return;
+        machine_.drain(time_.now());
+    }
+    // Below.
+    void receive(const std::string& instance, Channel channel, Frames frames, const Sender& sender) {
+        machine_.on_message(instance, std::move(frames), channel, time_.now(), sender);
+    }
+    void server_lost() { machine_.on_connection_lost(time_.now()); }
+    void pause(TimeNs duration) {
+        freeze(time_.now() + duration);
+        when_awake([this, duration] {
+            if (duration > k_second_ns) machine_.on_own_pause(duration);
+        });
+    }
+
+    [[nodiscard]] const ServerMachine& machine() const override { return machine_.above(); }
+    [[nodiscard]] const RelayMachine& relay_machine() const { return machine_; }
+    [[nodiscard]] const EventStore& store() const { return store_; }
+    [[nodiscard]] int number() const { return number_; }
+
+  private:
+    bool send_up(Channel channel, Frames&& frames) override {
+        cluster_.to_client(*this, channel, std::move(frames));
+        return true;
+    }
+    bool send_down(Channel channel, const std::string& instance, Frames frames) override {
+        return cluster_.to_server(channel, instance, std::move(frames));
+    }
+    void publish_down(Frames frames) override { cluster_.publish(number_, frames); }
+    void check_scene(RenderState state, Manifest) override {
+        time_.at(time_.now() + 5 * k_millisecond_ns, [this, state = std::move(state)] {
+            when_awake([this, state] {
+                CheckedScene checked{state, SceneDepot()};
+                machine_.on_checked(checked, time_.now());
+            });
+        });
+    }
+
+    void on_timers() override {
+        ServerMachine& above = machine_.above();
+        const bool was_linked = above.linked();
+        machine_.on_timers(time_.now());
+        if (above.ended() || (draining_ && machine_.drained())) {
+            machine_.say_goodbye(time_.now());
+            return kill();
+        }
+        if (was_linked && !above.linked()) dialling_ = false;
+        if (above.linked() || dialling_ || !machine_.wants_client(time_.now())) return;
+        dialling_ = true;
+        dial(above);
+    }
+    [[nodiscard]] TimeNs next_timer() const override { return machine_.next_timer(time_.now()); }
+
+    int number_;
+    EventStore store_;
+    RelayMachine machine_;
+    bool dialling_ = false;  ///< Since it was linked last.
+};
+
+inline void SimulatedCluster::Client::publish(Frames frames) { cluster_.publish(k_no_relay, frames); }
 
 }  // namespace pathscope::testing

@@ -48,17 +48,26 @@ ClusterSettings ClusterSettings::from_seed(std::uint32_t seed) {
         s.liars = 1 + int(below(2));
         s.lie = often(2) ? 0.01f : 0.3f * rng.next_float();
     }
+    if (often(3)) {  // Many rounds in a lease.
+        s.lease_time = from_seconds(4 * rng.next_float());
+        s.spp *= 2 + below(6);
+        s.round_samples = 1;
+    }
+    if (often(4)) s.relays = 1 + int(below(3));
     return s;
 }
 
 std::string ClusterSettings::describe() const {
     return fmt::format(
-        "{} servers, {}x{} in blocks of {}, {}+{} samples in rounds of {}, {}, {}, at least {}, lose {:.2f}, "
+        "{} servers, {} relays, {}x{} in blocks of {}, {}+{} samples in rounds of {}, leases of {:.2f} s, "
+        "{}, {}, at "
+        "least {}, lose {:.2f}, "
         "duplicate {:.2f}, damage {:.2f}, {:.1f} faults/s, {} states, {} restarts, {:.2f} of other bits {}, "
         "calm at {:.1f} s, {} liars of {:.2f}, {} incapable, {:.1f} audited",
-        servers, width, height, block, spp, direct_spp, round_samples, name_of(schedule), name_of(detector),
-        min_servers, lose, duplicate, damage, faults_per_second, new_states, restarts, differing,
-        relaxed ? "admitted" : "refused", to_seconds(calm_at), liars, lie, incapable, audit);
+        servers, relays, width, height, block, spp, direct_spp, round_samples, to_seconds(lease_time),
+        name_of(schedule), name_of(detector), min_servers, lose, duplicate, damage, faults_per_second,
+        new_states, restarts, differing, relaxed ? "admitted" : "refused", to_seconds(calm_at), liars, lie,
+        incapable, audit);
 }
 
 void ClusterTotals::add(const ClusterTotals& other) {
@@ -87,6 +96,8 @@ void ClusterTotals::add(const ClusterTotals& other) {
     bans += other.bans;
     lies += other.lies;
     audited += other.audited;
+    relay_faults += other.relay_faults;
+    relayed += other.relayed;
     unmasked += other.unmasked;
     undone += other.undone;
     failures += other.failures;
@@ -94,6 +105,7 @@ void ClusterTotals::add(const ClusterTotals& other) {
     ledger.granted += other.ledger.granted;
     ledger.accepted += other.ledger.accepted;
     ledger.late += other.ledger.late;
+    ledger.rounds_accepted += other.ledger.rounds_accepted;
     ledger.duplicates += other.ledger.duplicates;
     ledger.stale += other.ledger.stale;
     ledger.unknown += other.ledger.unknown;

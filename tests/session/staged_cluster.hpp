@@ -31,30 +31,46 @@ class StagedCluster : private ClientWorld {
   public:
     class Server : private ServerWorld {
       public:
-        bool cut = false;     ///< Nothing gets through, either way; nobody is told.
-        bool killed = false;  ///< As by kill -9.
-        bool renders = true;  ///< Else rounds stay in work.
+        bool cut = false;                          ///< Nothing gets through, either way; nobody is told.
+        bool killed = false;                       ///< As by kill -9.
+        bool renders = true;                       ///< Else rounds stay in work.
+        bool hears_cancel = true;                  ///< Else what was cancelled is on its way already.
+        std::function<bool(const Round&)> lies{};  ///< Of which rounds it gives another light than theirs.
+        std::optional<Channel> flipped{};          ///< There a bit flips in the routing id of its next link.
         std::vector<MessageType> heard;
         std::vector<message::Lease> leases;  ///< That reached it.
         int links = 0;                       ///< How often it dialled.
+
+        /// Says goodbye and hangs up.
+        void leave() {
+            machine_.say_goodbye(stage_.now_);
+            killed = true;
+        }
 
         [[nodiscard]] const ServerMachine& machine() const { return machine_; }
         [[nodiscard]] const std::string& instance() const { return instance_; }
 
       private:
         friend StagedCluster;
-        Server(StagedCluster& stage, int number)
+        Server(StagedCluster& stage, int number, std::string name, BitsIdentity bits)
             : stage_(stage),
               number_(number),
-              machine_(
-                  {fmt::format("server-{}", number), "0", own_bits(), 1, std::uint32_t(number), "client"},
-                  SceneCache({}), *this) {}
+              machine_({std::move(name), "0", std::move(bits), 1, std::uint32_t(number), "client"},
+                       SceneCache({}), *this) {}
+
+        /// By which routing id the client knows it there.
+        [[nodiscard]] std::string seen_as(Channel channel) const {
+            std::string id = instance_;
+            if (flipped_here_ == channel) id[1] = char(id[1] ^ 1);
+            return id;
+        }
 
         void receive(Frames frames, Channel channel) {
             if (cut || killed || !machine_.linked()) return;
             const Frames copy = frames;
             if (Decoded message = decode(Frames(copy), Role::server, channel)) {
                 heard.push_back(type_of(*message));
+                if (heard.back() == MessageType::cancel && !hears_cancel) return;
                 if (auto* lease = std::get_if<message::Lease>(&*message)) leases.push_back(*lease);
             }
             machine_.on_message(std::move(frames), channel, stage_.now_);
@@ -63,6 +79,7 @@ class StagedCluster : private ClientWorld {
             if (killed) return;
             if (!machine_.linked()) {
                 instance_ = fmt::format("{:>07}.link{:>4}", number_, ++links);
+                flipped_here_ = std::exchange(flipped, std::nullopt);
                 machine_.on_linked(instance_, stage_.now_);
             }
             if (wanted_) {
@@ -73,13 +90,15 @@ class StagedCluster : private ClientWorld {
                 RoundOutcome outcome = finish(jobs_.front(), cancelled_.contains(jobs_.front().ticket));
                 jobs_.pop_front();
                 ++done_;
+                if (outcome.result && lies && lies(outcome.round))
+                    outcome.result->sums[0] += PixelSum{1 << 20, 0, 0};
                 machine_.on_outcome(outcome, stage_.now_);
             }
             machine_.on_timers(stage_.now_);
         }
 
         bool send(Channel channel, Frames&& frames) override {
-            if (!cut) stage_.to_client(instance_, channel, std::move(frames));
+            if (!cut) stage_.to_client(seen_as(channel), channel, std::move(frames));
             return true;
         }
         void begin(RoundJob job) override { jobs_.push_back(std::move(job)); }
@@ -93,6 +112,7 @@ class StagedCluster : private ClientWorld {
         StagedCluster& stage_;
         int number_;
         std::string instance_;
+        std::optional<Channel> flipped_here_;
         std::deque<RoundJob> jobs_;
         std::set<std::uint64_t> cancelled_;
         std::uint64_t done_ = 0;
@@ -104,7 +124,14 @@ class StagedCluster : private ClientWorld {
     std::vector<MessageType>
         to_strangers;  ///< What the client said to peers that are no server of the stage.
 
-    explicit StagedCluster(std::uint32_t spp = 64) {
+    /// adjust: what is to be other than usual.
+    using Adjust = std::function<void(ClientConfig&, RenderSettings&)>;
+    explicit StagedCluster(std::uint32_t spp = 64, const Adjust& adjust = {}) {
+        config_.listens = true;
+        config_.min_servers = 1;
+        config_.block_size = 8;
+        config_.round_samples = 2;
+        config_.lease_time = 0;  // One round each: tests count leases.
         RenderState state;
         state.scene = *parse_scene_file(
             R"({"obj": "a.obj", "camera": {"position": [0, 0, 4], "look_at": [0, 0, 0]}})", "a.json");
@@ -112,14 +139,19 @@ class StagedCluster : private ClientWorld {
         state.settings.width = state.settings.height = 16;
         state.settings.spp = spp;
         state.settings.direct_spp = 1;
+        if (adjust) adjust(config_, state.settings);
         start_client(std::move(state));
     }
 
     /// The client that was there dies without a word; another takes its place and begins the frame anew.
     void restart_client() { start_client(client_->state()); }
 
-    Server& add_server() {
-        servers_.push_back(std::unique_ptr<Server>(new Server(*this, int(servers_.size()) + 1)));
+    /// Several may have one name: to the client they are one and the same, or one that came back.
+    Server& add_server(std::string name = {}, BitsIdentity bits = own_bits()) {
+        const int number = int(servers_.size()) + 1;
+        if (name.empty()) name = fmt::format("server-{}", number);
+        servers_.push_back(
+            std::unique_ptr<Server>(new Server(*this, number, std::move(name), std::move(bits))));
         return *servers_.back();
     }
 
@@ -146,8 +178,11 @@ class StagedCluster : private ClientWorld {
         const auto is_right = [&](LightPart part, const FrameSums& sums, std::uint32_t spp) {
             for (int y = 0; y < settings.height; ++y)
                 for (int x = 0; x < settings.width; ++x) {
+                    const std::uint32_t samples = sums.samples_of_block(sums.grid().block_at(x, y));
+                    // With passes, the rule says how many there are.
+                    if (samples != spp && !config_.sampling.staged()) return false;
                     PixelSum expected;
-                    for (std::uint32_t s = 0; s < spp; ++s)
+                    for (std::uint32_t s = 0; s < samples; ++s)
                         expected += light_of(settings.seed, part, x, y, s);
                     if (sums.sum_at(x, y) != expected) return false;
                 }
@@ -171,17 +206,12 @@ class StagedCluster : private ClientWorld {
     }
 
     void start_client(RenderState state) {
-        ClientConfig config;
-        config.listens = true;
-        config.min_servers = 1;
-        config.block_size = 8;
-        config.round_samples = 2;
         jobs_.clear();
         cancelled_.clear();
         client_.reset();
         store_ = std::make_unique<EventStore>();
         client_ =
-            std::make_unique<ClientMachine>(config, ClientJob{std::move(state), nullptr, SceneDepot()},
+            std::make_unique<ClientMachine>(config_, ClientJob{std::move(state), nullptr, SceneDepot()},
                                             ++sessions_, *store_, static_cast<ClientWorld&>(*this), now_);
     }
 
@@ -201,17 +231,17 @@ class StagedCluster : private ClientWorld {
         on_their_way_.push_back(
             [=, this, frames = std::move(frames)] { client_->on_message(instance, frames, channel, now_); });
     }
-    [[nodiscard]] Server* find(const std::string& instance) {
+    [[nodiscard]] Server* find(const std::string& instance, Channel channel) {
         for (const auto& server : servers_)
-            if (server->instance() == instance) return server.get();
+            if (server->seen_as(channel) == instance) return server.get();
         return nullptr;
     }
 
     bool send(Channel channel, const std::string& instance, Frames frames) override {
-        Server* const server = find(instance);
+        Server* const server = find(instance, channel);
         if (!server) {
             to_strangers.push_back(MessageType(std::uint8_t(frames[0][3])));
-            return true;
+            return channel == Channel::monitor;
         }
         if (server->killed) return false;
         if (!server->cut)
@@ -220,7 +250,8 @@ class StagedCluster : private ClientWorld {
     }
     void publish(Frames frames) override {
         if (lose_inputs) return;
-        for (const auto& server : servers_) (void)send(Channel::input, server->instance(), frames);
+        for (const auto& server : servers_)
+            (void)send(Channel::input, server->seen_as(Channel::input), frames);
     }
     void begin(RoundJob job) override { jobs_.push_back(std::move(job)); }
     void cancel_all() override {
@@ -232,6 +263,7 @@ class StagedCluster : private ClientWorld {
     std::vector<std::function<void()>> on_their_way_;
     std::vector<std::unique_ptr<Server>> servers_;
     std::deque<RoundJob> jobs_;  ///< Of the client.
+    ClientConfig config_;
     std::set<std::uint64_t> cancelled_;
     std::unique_ptr<EventStore> store_;
     std::unique_ptr<ClientMachine> client_;

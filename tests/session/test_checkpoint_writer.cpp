@@ -9,20 +9,13 @@
 #include "pathscope/core/log.hpp"
 #include "session/checkpoint_frames.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 using namespace pathscope;
 using namespace pathscope::testing;
 
 namespace {
-
-struct Log {
-    std::vector<std::string> warnings, notes;
-    LogSink before = set_log_sink([this](LogLevel level, std::string_view text) {
-        (level == LogLevel::warning ? warnings : notes).emplace_back(text);
-    });
-    ~Log() { set_log_sink(before); }
-};
 
 /// The moment is far away: all that is to be waited for is the thread.
 void wait_for_write(CheckpointWriter& writer) {
@@ -67,7 +60,7 @@ TEST_CASE("what cannot be written is said once, the last good file stays, and th
         writer.begin(monotonic_now(), fill);
         wait_for_write(writer);
     };
-    Log log;
+    LogCapture log;
     write();
     const std::string good = *read_file(path);
     std::filesystem::rename(place, away);

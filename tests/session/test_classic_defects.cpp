@@ -1,27 +1,18 @@
 /// What the classic distributed path tracer did wrong, as tests that ours would fail if it did so too. The table of all
 /// thirteen, S1 to S13, with the tests elsewhere that carry their numbers: docs/testing.md.
 
-#include "pathscope/core/log.hpp"
 #include "pathscope/protocol/block_result.hpp"
 
+#include "silence.hpp"
 #include "staged_cluster.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 using namespace pathscope;
 using namespace pathscope::testing;
 
 namespace {
-
-/// The machines tell people what happens; here nobody reads it.
-class Silence {
-  public:
-    Silence() : before_(set_log_sink([](LogLevel, std::string_view) {})) {}
-    ~Silence() { set_log_sink(before_); }
-
-  private:
-    LogSink before_;
-};
 
 constexpr std::uint64_t k_rounds =
     4 * 64 / 2;  ///< Of the stage's frame: blocks, samples, samples of a round.
@@ -66,7 +57,7 @@ struct BusyServer {
 
 TEST_CASE(
     "S1: a server that joins or dies restarts nobody: what is committed stays, and is not rendered again") {
-    const Silence silence;
+    const LogCapture quiet;
     StagedCluster stage;
     StagedCluster::Server& a = stage.add_server();
     StagedCluster::Server& b = stage.add_server();
@@ -97,7 +88,7 @@ TEST_CASE(
 }
 
 TEST_CASE("S3: a server that was given up by mistake joins again when it is heard, and works") {
-    const Silence silence;
+    const LogCapture quiet;
     StagedCluster stage(4096);
     StagedCluster::Server& a = stage.add_server();
     stage.add_server();
@@ -116,7 +107,7 @@ TEST_CASE("S3: a server that was given up by mistake joins again when it is hear
 }
 
 TEST_CASE("S5: states are absolute: whatever the input channel loses, servers end with the client's view") {
-    const Silence silence;
+    const LogCapture quiet;
     StagedCluster stage(4096);
     StagedCluster::Server& a = stage.add_server();
     StagedCluster::Server& b = stage.add_server();
@@ -139,7 +130,7 @@ TEST_CASE("S5: states are absolute: whatever the input channel loses, servers en
 }
 
 TEST_CASE("S7: a result of another layout, or of another size than its lease, changes nothing") {
-    const Silence silence;
+    const LogCapture quiet;
     BusyServer busy;
     StagedCluster& stage = busy.stage;
     const message::Lease old = busy.server.leases.front();
@@ -165,7 +156,7 @@ TEST_CASE("S7: a result of another layout, or of another size than its lease, ch
 }
 
 TEST_CASE("S8: whoever did not say HELLO is no server, whatever else it says") {
-    const Silence silence;
+    const LogCapture quiet;
     BusyServer busy;
     StagedCluster& stage = busy.stage;
     const std::size_t known = stage.store().servers().size();
@@ -189,7 +180,7 @@ TEST_CASE("S8: whoever did not say HELLO is no server, whatever else it says") {
 }
 
 TEST_CASE("S11: servers that were there before the client, and after it died, find the next one") {
-    const Silence silence;
+    const LogCapture quiet;
     StagedCluster stage;
     StagedCluster::Server& a = stage.add_server();
     a.cut = true;  // No client far and wide: HELLO goes unheard, for a minute.
@@ -206,7 +197,7 @@ TEST_CASE("S11: servers that were there before the client, and after it died, fi
 }
 
 TEST_CASE("S12: every round is in the picture when it comes, with the number of its samples") {
-    const Silence silence;
+    const LogCapture quiet;
     BusyServer busy;
     StagedCluster& stage = busy.stage;
     const message::Lease lease = busy.server.leases.front();
@@ -218,7 +209,7 @@ TEST_CASE("S12: every round is in the picture when it comes, with the number of 
 }
 
 TEST_CASE("S13: without servers the client renders indirect light itself, the same to the last bit") {
-    const Silence silence;
+    const LogCapture quiet;
     StagedCluster stage;
     StagedCluster::Server& a = stage.add_server();
     REQUIRE(stage.pass_until([&] { return stage.committed() > k_rounds / 4; }));

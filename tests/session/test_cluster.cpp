@@ -2,8 +2,9 @@
 /// the render of one machine.
 
 #include <atomic>
-#include <chrono>
+#include <condition_variable>
 #include <functional>
+#include <mutex>
 #include <thread>
 
 #include "pathscope/image/image_hash.hpp"
@@ -97,6 +98,27 @@ class RunningServer {
     std::unique_ptr<ServerSession> session_;
     std::thread thread_;
     Result<void> result_;
+};
+
+/// Holds up whoever passes, until it is opened.
+class Gate {
+  public:
+    void pass() {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [this] { return open_; });
+    }
+    void open() {
+        {
+            const std::lock_guard lock(mutex_);
+            open_ = true;
+        }
+        changed_.notify_all();
+    }
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    bool open_ = false;
 };
 
 /// Steps the client until `done`; false when patience ends.
@@ -413,7 +435,7 @@ TEST_CASE("a server of other bits is refused and told why; a relaxed client take
     CHECK(hash_of(*client) == small.hash_of_one_machine());  // It only says that its bits differ.
     CHECK(client->differing_rounds() > 0);
     CHECK(client->differing_rounds() == store.total(Counter::differing_rounds));
-    CHECK(client->differing_rounds() == store.server(ServerId{1})->total(Counter::tiles));
+    CHECK(client->differing_rounds() == store.server(ServerId{1})->total(Counter::rounds_committed));
     RenderState again = small.state;
     again.settings.seed = 8;
     client->change_state(again);
@@ -425,11 +447,10 @@ TEST_CASE(
     const SmallJob small(16);
     const TemporaryFolder cache;
     std::atomic<int> rounds{0};
-    std::atomic<bool> blocks{true};
+    Gate gate;
     ServerConfig config;
     config.before_round = [&] {
-        if (rounds.fetch_add(1) < 3) return;
-        while (blocks.load()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        if (rounds.fetch_add(1) >= 3) gate.pass();
     };
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
@@ -441,7 +462,7 @@ TEST_CASE(
         CHECK(store.total(Counter::stuck) >= 1);
         CHECK(store.total(Counter::died) == 0);
         CHECK(client->progress().servers_ready == 0);
-        blocks.store(false);
+        gate.open();
         CHECK(step_until(*client, [&] { return client->progress().servers_ready == 1; }));
     }
     CHECK(hash_of(*client) == small.hash_of_one_machine());

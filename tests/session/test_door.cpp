@@ -8,29 +8,15 @@
 #include "pathscope/net/key_file.hpp"
 #include "pathscope/net/poller.hpp"
 
+#include "log_capture.hpp"
 #include "testing.hpp"
 
 using namespace pathscope;
+using namespace pathscope::testing;
 
 namespace {
 
 constexpr TimeNs k_patience = 10 * k_second_ns;
-
-/// What is logged while it lives.
-class Sentences {
-  public:
-    Sentences()
-        : before_(set_log_sink([this](LogLevel, std::string_view text) { all_.append(text).append("\n"); })) {
-    }
-    ~Sentences() { set_log_sink(before_); }
-    Sentences(const Sentences&) = delete;
-    Sentences& operator=(const Sentences&) = delete;
-    [[nodiscard]] bool have(const std::string& part) const { return all_.find(part) != std::string::npos; }
-
-  private:
-    std::string all_;
-    LogSink before_;
-};
 
 /// The sockets behind a door, as a client session holds them.
 struct House {
@@ -83,10 +69,10 @@ TEST_CASE("without keys a client listens on this machine only, unless its user i
     REQUIRE_FALSE(bool(check_listening(config)));
     CHECK(check_listening(config).error().message.find("--insecure") != std::string::npos);
     CHECK_FALSE(bool(Door::open(Context(), config)));
-    Sentences said;
+    LogCapture log;
     config.insecure = true;
     CHECK(bool(Door::open(Context(), config)));
-    CHECK(said.have("Insecure"));
+    CHECK(log.count("Insecure") > 0);
 
     config.insecure = false;
     config.keys = ClientKeys{make_key_pair(), {}};
@@ -114,7 +100,7 @@ TEST_CASE("local servers get a key each, in a private file that goes with the do
         REQUIRE(bool(keys));
         for (const std::string& argument : first) CHECK(argument != keys->secret_key);
         CHECK(house.hears(Dialler{*keys, config.keys->pair.public_key}));
-        Sentences said;
+        LogCapture log;
         CHECK_FALSE(house.hears(Dialler{make_key_pair(), config.keys->pair.public_key}));
     }
     CHECK_FALSE(std::filesystem::exists(file.parent_path()));
@@ -127,20 +113,20 @@ TEST_CASE("who is turned away is counted and told, and the list holds as soon as
     const KeyPair client = make_key_pair(), server = make_key_pair(), late = make_key_pair();
     REQUIRE(bool(write_file_atomically(list, server.public_key + "\n")));
     House house(with_keys(client, list));
-    Sentences said;
+    LogCapture log;
     CHECK(house.hears(Dialler{server, client.public_key}));
     CHECK_FALSE(house.hears(Dialler{late, client.public_key}));
     // ZAP tells of it on a thread of its own.
     for (const TimeNs limit = monotonic_now() + k_patience;
-         !said.have(late.public_key) && monotonic_now() < limit;)
+         log.count(late.public_key) == 0 && monotonic_now() < limit;)
         (void)house.door.step(monotonic_now(), house.input);
-    CHECK(said.have(late.public_key));
+    CHECK(log.count(late.public_key) > 0);
     CHECK_FALSE(house.hears({}));
 
     REQUIRE(bool(write_file_atomically(list, late.public_key + "\n")));
     TimeNs now = monotonic_now();
     for (int i = 0; i < 3; ++i) (void)house.door.step(now += AllowList::k_look, house.input);
-    CHECK(said.have("it has 1 key."));
+    CHECK(log.count("it has 1 key.") > 0);
     CHECK(house.hears(Dialler{late, client.public_key}));
     CHECK_FALSE(house.hears(Dialler{server, client.public_key}));
 

@@ -1,5 +1,6 @@
 #include "pathscope/session/frame_work.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include "testing.hpp"
@@ -33,9 +34,10 @@ struct SmallWork {
         work.set_servers({{k_server, 0}});
         return dropped;
     }
-    std::optional<Lease> grant(LightPart part) {
+    std::optional<Lease> grant(LightPart part, std::uint32_t most = 1) {
         if (part == LightPart::direct) return work.grant_direct(0);
-        return work.grant_indirect(k_server, 0, [](const Round&, std::uint32_t) { return k_second_ns; });
+        return work.grant_indirect(k_server, 0, most,
+                                   [](const Round&, std::uint32_t) { return k_second_ns; });
     }
     Verdict commit(LightPart part, const Lease& lease) {
         const ResultClaim claim{lease.id, lease.epoch, lease.unit, lease.first, lease.count, lease.server};
@@ -48,6 +50,18 @@ struct SmallWork {
             sum += std::int64_t(s + 1) * (lease.unit + 1);
         return std::vector<PixelSum>(std::size_t(work.round_of(lease).rect.area()),
                                      PixelSum{sum, 2 * sum, 0});
+    }
+    /// Commits a round of the part that is behind, or of the other if it has none; of which it was.
+    LightPart advance() {
+        LightPart part = work.direct_is_behind() ? LightPart::direct : LightPart::indirect;
+        auto lease = grant(part);
+        if (!lease) {
+            part = part == LightPart::direct ? LightPart::indirect : LightPart::direct;
+            lease = grant(part);
+        }
+        REQUIRE(lease);
+        REQUIRE(commit(part, *lease) == Verdict::accepted);
+        return part;
     }
     /// Commits all rounds that there are; how many.
     int finish(LightPart part) {
@@ -151,15 +165,22 @@ TEST_CASE(
         settings.spp = spp;
         SmallWork frame(settings);
         int rounds = 0;
-        while (!frame.work.has_image() && rounds < 1000) {
-            const LightPart part = frame.work.direct_is_behind() ? LightPart::direct : LightPart::indirect;
-            const LightPart other = part == LightPart::direct ? LightPart::indirect : LightPart::direct;
-            const auto lease = frame.grant(part);
-            if (lease) REQUIRE(frame.commit(part, *lease) == Verdict::accepted);
-            if (!lease) REQUIRE(frame.commit(other, *frame.grant(other)) == Verdict::accepted);
-            ++rounds;
-        }
+        for (; !frame.work.has_image() && rounds < 1000; ++rounds) frame.advance();
         CHECK(rounds == 2 * 15);
+    }
+}
+
+TEST_CASE("a part that has an end reaches it, round for round, beside one that goes on until it is stopped") {
+    constexpr std::uint32_t k_rounds = 10;
+    for (const LightPart ends : {LightPart::direct, LightPart::indirect}) {
+        RenderSettings settings = small_frame();
+        settings.direct_spp = ends == LightPart::direct ? 4 * k_rounds : k_open_ended;
+        settings.spp = ends == LightPart::indirect ? 4 * k_rounds : k_open_ended;
+        SmallWork frame(settings);
+        std::uint32_t of_it = 0;
+        for (std::uint32_t round = 0; round < 2 * k_rounds * 15; ++round) of_it += frame.advance() == ends;
+        CHECK(of_it == k_rounds * 15);
+        CHECK(frame.work.has_image());
     }
 }
 
@@ -268,4 +289,25 @@ TEST_CASE("direct rounds that were granted before are not granted beside an indi
     CHECK(frame.finish(LightPart::direct) == 15);
     while (const auto indirect = frame.grant(LightPart::indirect))
         CHECK_FALSE(frame.work.grant_direct_beside(*indirect, 0));
+}
+
+TEST_CASE("a lease may hold all rounds of a block but its first, and the picture is the same") {
+    RenderSettings settings = small_frame();
+    settings.spp = 18;  // Rounds of 4, 4, 4, 4 and 2 samples.
+    SmallWork one(settings), many(settings);
+    CHECK(one.finish(LightPart::indirect) == 15 * 5);
+    int leases = 0;
+    std::uint32_t most = 0;
+    while (const auto lease = many.grant(LightPart::indirect, 3)) {
+        CHECK((lease->first > 0 || lease->count == 4));
+        most = std::max(most, lease->count);
+        REQUIRE(many.commit(LightPart::indirect, *lease) == Verdict::accepted);
+        ++leases;
+    }
+    CHECK(most == 12);
+    CHECK(leases == 15 * 3);  // 4 | 4 4 4 | 2
+    CHECK(many.work.indirect_progress() == 1);
+    for (int y = 0; y < settings.height; ++y)
+        for (int x = 0; x < settings.width; ++x)
+            CHECK(many.work.indirect().sum_at(x, y) == one.work.indirect().sum_at(x, y));
 }

@@ -143,3 +143,53 @@ TEST_CASE("a banned server leaves at once, is silent until the ban's end, and th
     now += k_second_ns;
     CHECK(says_hello());
 }
+
+TEST_CASE("a scene that is loaded late does not replace the one that the client went back to") {
+    constexpr std::uint64_t k_session = 77;
+    const TemporaryFolder folder;
+    StoppableWorld world;
+    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
+    TimeNs now = k_second_ns;
+    const auto say = [&](Message message) {
+        const Channel channel = k_message_table[message.index()].channel;
+        server.on_message(encode(std::move(message)), channel, now);
+        server.on_timers(now);
+    };
+    const auto render = [&](std::uint64_t number, Epoch epoch) {
+        message::Lease lease;
+        lease.session = k_session;
+        lease.epoch = epoch;
+        lease.strategy = k_blocks_strategy;
+        lease.rect = {0, 0, 4, 4};
+        lease.lease.value = number;
+        lease.count = lease.lease_ms = 1;
+        say(lease);
+        return world.begun.empty() ? nullptr : world.begun.back().scene;
+    };
+    RenderState other = small_state();
+    other.options.smoothing = !other.options.smoothing;  // Another scene of the same files.
+    const std::string first = pack(PackValue(encode_state(small_state())));
+    const std::string second = pack(PackValue(encode_state(other)));
+    const auto scene_of_first = std::make_shared<const Scene>();
+
+    server.on_linked(std::string(16, 'i'), now);
+    say(message::Welcome{k_session, ServerId{1}, 250, 5000, 2, Epoch{1}, 0, hash_text(first), first});
+    say(message::Manifest{hash_text(pack_manifest({})), pack_manifest({})});
+    LoadedScene loaded{small_state(), scene_of_first};
+    server.on_loaded(loaded, now);
+    CHECK(render(1, Epoch{1}) == scene_of_first);
+
+    say(message::Snapshot{k_session, Epoch{2}, 1, hash_text(second), second});
+    say(message::Manifest{hash_text(pack_manifest({})), pack_manifest({})});
+    REQUIRE(world.wanted.has_value());
+    CHECK(world.wanted->options.smoothing == other.options.smoothing);
+    CHECK_FALSE(server.working_on().has_value());
+    say(message::Snapshot{k_session, Epoch{3}, 2, hash_text(first), first});
+    REQUIRE(server.working_on().has_value());
+
+    LoadedScene late{other, std::make_shared<const Scene>()};
+    server.on_loaded(late, now);
+    CHECK(server.working_on() == hash_text(first));
+    world.begun.clear();
+    CHECK(render(2, Epoch{3}) == scene_of_first);
+}

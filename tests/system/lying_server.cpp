@@ -1,6 +1,6 @@
 /// The render server with one fault: one bit of one result in nine is false. For test_audit.py alone.
 ///
-/// This program is pathscope-server's main and a copy of server_work.cpp, compiled with put_block_result renamed to the
+/// This program is pathscope-server's and a copy of server_work.cpp, compiled with put_block_result renamed to the
 /// function below, so that everything else of it is sound: the sizes, the hash, the time it takes.
 
 #undef put_block_result

@@ -17,7 +17,7 @@ import tempfile
 import time
 import unittest
 
-from processes import cpu_seconds
+from processes import cpu_seconds, wait_for
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
@@ -26,14 +26,6 @@ JOB = ["--size", f"{WIDTH}x{HEIGHT}", "--spp", str(SPP), "--direct-spp", str(DIR
 NEAR, FAR = "10.77.0.1", "10.77.0.2"
 NEAR_CAP, FAR_CAP = 150_000, 300_000  # Samples per second: the frame lasts for long enough, on any machine.
 PATIENCE_S = 300  # A run that takes longer has failed.
-
-
-def wait_for(condition, what):
-    limit = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > limit:
-            raise AssertionError("waited in vain for " + what)
-        time.sleep(0.01)
 
 
 class Namespace:
@@ -123,7 +115,7 @@ class Cable(unittest.TestCase):
                                  self.folder / "client", "--allow", self.folder / "allowed", *options)
         self.addCleanup(self.end, self.render)
         self.servers = [self.start_server(*one) for one in ((near, "near", NEAR_CAP), (far, "far-1", FAR_CAP), (far, "far-2", FAR_CAP))]
-        wait_for(lambda: all(cpu_seconds(server.pid) > 0.3 for server in self.servers) or self.render.poll() is not None, "the servers to work")
+        wait_for(lambda: all(cpu_seconds(server.pid) > 0.3 for server in self.servers) or self.render.poll() is not None, "the servers to work", PATIENCE_S)
 
     def start_server(self, namespace, name, cap):
         server = namespace.start(self.folder, "pathscope-server", "--connect", NEAR, "--name", name, "--threads", "1", "--speed-cap", cap,
@@ -148,7 +140,7 @@ class Cable(unittest.TestCase):
     def test_pulled_for_longer_than_detection_takes(self):
         self.start()
         pull()
-        wait_for(lambda: self.render.log.read_text().count(" is lost: It has been silent") == 2, "the far servers to be given up")
+        wait_for(lambda: self.render.log.read_text().count(" is lost: It has been silent") == 2, "the far servers to be given up", PATIENCE_S)
         time.sleep(2)  # The near one works on.
         put_back()
         lives = self.check(self.finish(self.render))

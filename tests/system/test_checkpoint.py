@@ -15,7 +15,7 @@ import tempfile
 import time
 import unittest
 
-from processes import cpu_seconds
+from processes import cpu_seconds, free_ports
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
@@ -141,9 +141,10 @@ class Checkpoints(unittest.TestCase):
 
     def test_a_server_outlives_its_client(self):
         expected = self.expected()
-        cluster = ["--listen", "127.0.0.1", "--ports", "7755,7756,7757"]
+        ports = free_ports()
+        cluster = ["--listen", "127.0.0.1", "--ports", ports]
         environment = dict(os.environ, XDG_CACHE_HOME=str(self.folder))
-        server = subprocess.Popen([BIN / "pathscope-server", "--ports", "7755,7756,7757", "--name", "loyal", "--quiet"],
+        server = subprocess.Popen([BIN / "pathscope-server", "--ports", ports, "--name", "loyal", "--quiet"],
                                   env=environment)
         self.addCleanup(server.wait)
         self.addCleanup(server.kill)

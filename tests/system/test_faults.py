@@ -13,7 +13,7 @@ import tempfile
 import time
 import unittest
 
-from processes import cpu_seconds
+from processes import cpu_seconds, free_ports
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
@@ -100,7 +100,7 @@ class Faults(unittest.TestCase):
 
     def test_kill_9_of_another_machines_server(self):
         """It is no child of the client: the end of its connection alone tells, long before heartbeats would."""
-        ports = "7665,7666,7667"
+        ports = free_ports()
         run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
         run.working_servers(1)
         other = start_server(self.folder, ports, "other")
@@ -138,7 +138,7 @@ class Faults(unittest.TestCase):
         self.assertEqual([pid for pid in servers if pathlib.Path(f"/proc/{pid}").exists()], [])
 
     def test_late_server(self):
-        ports = "7655,7656,7657"
+        ports = free_ports()
         run = Run(self.folder, "--servers", "1", "--listen", "127.0.0.1", "--ports", ports)
         run.working_servers(1)
         late = start_server(self.folder, ports, "late")

@@ -8,7 +8,6 @@ import json
 import os
 import pathlib
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -17,19 +16,14 @@ import unittest
 
 from processes import free_ports
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, "tools/cycles")
+from pictures import read_pfm  # noqa: E402
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 WIDTH, HEIGHT, SPP, BLOCK = 100, 70, 32, 32
 PATIENCE_S = 60  # What takes longer has failed.
-
-
-def read_pfm(path):
-    """Rows from the top; each pixel three floats."""
-    kind, size, scale, pixels = path.read_bytes().split(b"\n", 3)
-    width, height = map(int, size.split())
-    assert kind == b"PF" and float(scale) < 0
-    floats = list(struct.iter_unpack("<3f", pixels))
-    return [floats[row * width:(row + 1) * width] for row in reversed(range(height))]
 
 
 class PythonWorker(unittest.TestCase):
@@ -70,10 +64,13 @@ class PythonWorker(unittest.TestCase):
         stats = json.loads((self.folder / "stats.json").read_text())
         self.assertEqual(stats["rounds"], stats["rounds_committed"])
         quantum = 2.0 ** (20 + stats["quantum_exponent"])
-        for y, row in enumerate(read_pfm(self.folder / "image.pfm")):
-            for x, pixel in enumerate(row):
+        width, height, values = read_pfm(self.folder / "image.pfm")
+        self.assertEqual((width, height), (WIDTH, HEIGHT))
+        for y in range(height):
+            for x in range(width):
+                pixel = 3 * ((height - 1 - y) * width + x)  # Its rows go up.
                 corner = x // BLOCK * BLOCK + y // BLOCK * BLOCK
-                self.assertEqual(pixel, (512 * quantum, (SPP - 1) / 2 * quantum, corner * quantum))
+                self.assertEqual(tuple(values[pixel:pixel + 3]), (512 * quantum, (SPP - 1) / 2 * quantum, corner * quantum))
         return stats, {server["name"]: server for server in stats["servers"]}
 
     def test_it_joins_is_kept_alive_and_renders_all_of_the_frame(self):

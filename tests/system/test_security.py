@@ -15,30 +15,12 @@ import tempfile
 import time
 import unittest
 
-from processes import cpu_seconds
+from processes import cpu_seconds, free_ports, wait_for
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
 JOB = ["--size", "96x64", "--spp", "64", "--direct-spp", "4", "--seed", "7"]
 PATIENCE_S = 120  # What takes longer has failed.
-
-
-def wait_for(condition, what):
-    limit = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > limit:
-            raise AssertionError("waited in vain for " + what)
-        time.sleep(0.01)
-
-
-def free_ports():
-    sockets = [socket.socket() for _ in range(3)]
-    for one in sockets:
-        one.bind(("127.0.0.1", 0))
-    ports = [one.getsockname()[1] for one in sockets]
-    for one in sockets:
-        one.close()
-    return ports
 
 
 class Program:
@@ -58,7 +40,7 @@ class Program:
         """One of them."""
         def said():
             return any(part in self.text() for part in parts)
-        wait_for(lambda: said() or self.process.poll() is not None, f"'{parts}'")
+        wait_for(lambda: said() or self.process.poll() is not None, f"'{parts}'", PATIENCE_S)
         return said()
 
     def stop(self):
@@ -108,7 +90,7 @@ class Security(unittest.TestCase):
 
     def listen(self, *options, keys=True):
         """A client that waits until a server comes."""
-        options = ["--listen", "127.0.0.1", "--ports", ",".join(map(str, self.ports)), *options]
+        options = ["--listen", "127.0.0.1", "--ports", self.ports, *options]
         if keys:
             options += ["--allow", self.allow]
         client = self.render(*options, keys=keys)
@@ -118,7 +100,7 @@ class Security(unittest.TestCase):
     def server(self, key=None, client="client", *options):
         if key:
             options += ("--key", self.folder / key, "--server-key", self.folder / f"{client}.pub")
-        server = Program(self.folder, "pathscope-server", "--ports", ",".join(map(str, self.ports)), "--threads", "1",
+        server = Program(self.folder, "pathscope-server", "--ports", self.ports, "--threads", "1",
                          "--name", key or "plain", *options)
         self.running.append(server)
         return server
@@ -141,7 +123,7 @@ class Security(unittest.TestCase):
         self.running.append(client)
         folders = lambda: list(self.folder.glob("pathscope-keys-*"))
         wait_for(lambda: len(list(self.folder.glob("pathscope-keys-*/*.key"))) == 2 or client.process.poll() is not None,
-                 "the keys of local servers")
+                 "the keys of local servers", PATIENCE_S)
         for key in self.folder.glob("pathscope-keys-*/*.key"):
             self.assertEqual(stat.S_IMODE(key.stat().st_mode), 0o600)
             self.assertEqual(stat.S_IMODE(key.parent.stat().st_mode), 0o700)
@@ -205,7 +187,7 @@ class Security(unittest.TestCase):
         client = self.listen("--min-servers", "2")
         client.says("Waiting for servers")
         waiting = cpu_seconds(revoked.process.pid)
-        wait_for(lambda: cpu_seconds(revoked.process.pid) > waiting + 0.05 or client.process.poll() is not None, "work")
+        wait_for(lambda: cpu_seconds(revoked.process.pid) > waiting + 0.05 or client.process.poll() is not None, "work", PATIENCE_S)
         self.assertIsNone(client.process.poll(), client.text())
         self.allow.write_text((self.folder / "good.pub").read_text())
         begin = time.monotonic()
@@ -221,7 +203,7 @@ class Security(unittest.TestCase):
 
     def knock(self, client):
         garbage = [b"GET / HTTP/1.1\r\nHost: a\r\n\r\n", os.urandom(4096), b"\xff\x00\x00\x00\x00\x00\x00\x00\x01\x7f\x03\x00CURVE"]
-        for port in self.ports:
+        for port in map(int, self.ports.split(",")):
             for text in garbage:
                 with socket.create_connection(("127.0.0.1", port)) as line:
                     line.sendall(text)
@@ -296,7 +278,7 @@ class Security(unittest.TestCase):
 
     def test_an_address_that_others_can_reach(self):
         self.assertIn("--insecure", self.refused_at_once("pathscope-render", "--listen", "0.0.0.0"))
-        ports = ["--ports", ",".join(map(str, self.ports))]
+        ports = ["--ports", self.ports]
         for keys in False, True:
             options = ["--key", self.folder / "client", "--allow", self.allow] if keys else ["--insecure"]
             client = self.render("--listen", "0.0.0.0", "--min-servers", "0", *ports, *options, keys=False)

@@ -12,11 +12,10 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 import urllib.request
 
-from processes import free_ports
+from processes import free_ports, wait_for
 from small_slurm import CannotBeHad, SmallSlurm
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -66,12 +65,12 @@ class Slurm(unittest.TestCase):
         return json.loads((self.folder / "stats.json").read_text())
 
     def wait_for(self, condition, what, process):
-        limit = time.monotonic() + PATIENCE_S
-        while not (found := condition()):
-            self.assertIsNone(process.poll(), f"The client ended while we waited for {what}: {self.log.read_text()}")
-            self.assertLess(time.monotonic(), limit, f"waited in vain for {what}: {self.log.read_text()}")
-            time.sleep(0.1)
-        return found
+        def met():
+            found = condition()
+            if not found:
+                self.assertIsNone(process.poll(), f"The client ended while we waited for {what}: {self.log.read_text()}")
+            return found
+        return wait_for(met, what, PATIENCE_S, pause_s=0.1)
 
     def metric(self, url, line):
         text = urllib.request.urlopen(url, timeout=PATIENCE_S).read().decode()

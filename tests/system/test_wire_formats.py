@@ -3,7 +3,6 @@
 
     test_wire_formats.py BIN      BIN: the folder of pathscope-render and pathscope-server
 """
-import array
 import json
 import pathlib
 import subprocess
@@ -11,18 +10,13 @@ import sys
 import tempfile
 import unittest
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, "tools/cycles")
+from pictures import read_pfm  # noqa: E402
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 PATIENCE_S = 300
 WIDTH, HEIGHT, SPP = 70, 50, 8
-
-
-def pixels_of(file):
-    """The floats of a .pfm of three channels."""
-    data = file.read_bytes()
-    values = array.array("f", data[-12 * WIDTH * HEIGHT :])
-    if float(data.split(b"\n", 3)[2]) > 0:
-        values.byteswap()
-    return values
 
 
 class WireFormats(unittest.TestCase):
@@ -33,7 +27,7 @@ class WireFormats(unittest.TestCase):
                      "--spp", str(spp), "--indirect-only", "--servers", "1", "--wire", wire, "--stats", folder / "stats.json", *arguments]
             done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S)
             self.assertEqual(done.returncode, 0, done.stderr)
-            return json.loads((folder / "stats.json").read_text()), pixels_of(folder / "a.pfm"), done.stderr
+            return json.loads((folder / "stats.json").read_text()), read_pfm(folder / "a.pfm")[2], done.stderr
 
     def test_each_format_is_as_near_as_it_says_and_as_small(self):
         exact, truth, said = self.render("exact")

@@ -60,6 +60,21 @@ TEST_CASE("fields of the right kind are read") {
     CHECK_FALSE(fields.error().has_value());
 }
 
+TEST_CASE("fields are found in any order, and as often as one likes") {
+    const PackMap map = basket();
+    FieldReader fields(map, "BASKET");
+    CHECK(fields.map("inner").size() == 1);  // The last but one, then those before it.
+    CHECK(fields.text("name", 1, 8) == "a basket");
+    CHECK(fields.i64("debt") == -5);
+    CHECK(fields.i64("debt") == -5);
+    CHECK(fields.u64("count") == 5);
+    CHECK(fields.f64("weight") == 1.5);
+    CHECK_FALSE(fields.error().has_value());
+    CHECK(fields.u64("none") == 0);
+    CHECK(fields.u64("count") == 5);
+    CHECK(fields.error()->message == "BASKET: field 'none' is missing.");
+}
+
 TEST_CASE("each sentence names the context, the field and what is wrong") {
     CHECK(sentence([](FieldReader& f) { f.u64("none"); }) == "BASKET: field 'none' is missing.");
     CHECK(sentence([](FieldReader& f) { f.u64("name"); }) == "BASKET: field 'name' is text, not integer.");

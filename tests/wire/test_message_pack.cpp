@@ -124,6 +124,41 @@ TEST_CASE("MessagePack bytes are those of its specification") {
     check(example, "82 a7 636f6d70616374 c3 a6 736368656d61 00");
 }
 
+TEST_CASE("a writer says what pack() says of the same value") {
+    PackMap map;
+    PackArray array;
+    PackWriter out;
+    out.map(20);
+    for (int i = 0; i < 16; ++i) {
+        map.set("key" + std::to_string(i), -i);
+        out.text("key" + std::to_string(i));
+        out.integer(std::int64_t{-i});
+    }
+    map.set("many", PackArray{PackValue(), true, 1.5, PackBytes{"\x01\x02"}, "text"});
+    out.text("many");
+    out.array(5);
+    out.nil();
+    out.boolean(true);
+    out.real(1.5);
+    out.bytes("\x01\x02");
+    out.text("text");
+    map.set("none", PackArray{});
+    out.text("none");
+    out.array(0);
+    map.set("large", std::uint64_t{1} << 63);
+    out.text("large");
+    out.integer(std::uint64_t{1} << 63);
+    PackWriter last;
+    map.set("last", 7);
+    last.text("last");
+    last.integer(std::int64_t{7});
+    out.append(last);
+    const std::size_t size = out.size();
+    const std::string said = out.take();
+    CHECK(said.size() == size);
+    CHECK(said == pack(PackValue(map)));
+}
+
 TEST_CASE("lengths take the shortest of their forms") {
     const auto starts = [](const PackValue& value, std::string_view hex) {
         CHECK(pack(value).substr(0, from_hex(hex).size()) == from_hex(hex));
@@ -165,6 +200,11 @@ TEST_CASE("a map has a key once, in the order it was set") {
     CHECK(map.entries().front().key == "a");
     CHECK(contains(refusal(from_hex("82 a161 01 a161 02")), "a key twice"));
     CHECK_FALSE(PackMap::from_entries({{"a", 1}, {"b", 2}, {"a", 3}}).has_value());
+    std::vector<PackEntry> many;
+    for (int i = 0; i < 100; ++i) many.push_back({std::to_string(i), i});
+    CHECK(PackMap::from_entries(many).has_value());
+    many.back().key = "0";
+    CHECK_FALSE(PackMap::from_entries(many).has_value());
 }
 
 TEST_CASE("what is not of ours is refused with the place") {

@@ -51,19 +51,34 @@ inline CLI::Option* add_size(CLI::App& app, std::optional<std::pair<int, int>>& 
 }
 
 /// "5555,5556,5557" -> three ports from 1 to 65535.
-inline CLI::Option* add_ports(CLI::App& app, std::array<int, 3>& ports) {
-    const auto assign = [&ports](const std::string& text) {
+inline CLI::Option* add_ports(CLI::App& app, std::array<int, 3>& ports, const std::string& flag = "--ports",
+                              const std::string& help = "") {
+    const auto assign = [&ports, flag](const std::string& text) {
         const std::vector<std::string> parts = CLI::detail::split(text, ',');
         bool good = parts.size() == ports.size();
         for (std::size_t i = 0; good && i < ports.size(); ++i)
             good = CLI::detail::lexical_cast(parts[i], ports[i]) && ports[i] >= 1 && ports[i] <= 65535;
         if (!good)
             throw CLI::ValidationError(
-                "--ports", "'" + text + "' is not three ports from 1 to 65535, as in 5555,5556,5557");
+                flag, "'" + text + "' is not three ports from 1 to 65535, as in 5555,5556,5557");
     };
     return app
-        .add_option_function<std::string>("--ports", assign, "input, monitor and frames (5555,5556,5557)")
+        .add_option_function<std::string>(
+            flag, assign,
+            help + fmt::format("input, monitor and frames ({},{},{})", ports[0], ports[1], ports[2]))
         ->type_name("A,B,C");
+}
+
+/// --name NAME
+inline CLI::Option* add_name(CLI::App& app, std::string& name) {
+    return app.add_option("--name", name, "for people (host name and process id)")
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+                return text.empty() || text.size() > 64 ? std::string("a name has 1 to 64 bytes")
+                                                        : std::string();
+            },
+            "NAME"))
+        ->type_name("NAME");
 }
 
 /// --mesh-cache DIR|off, as a word that mesh_cache_of() understands; empty if it is not given.

@@ -1,8 +1,8 @@
 /// bvh: how many rays a second do our trees answer, and Embree in the same minute?
 ///
-/// For each scene and number of threads: all tracers build, taking turns, and the median counts. Then, for each set of rays, all
-/// calls of all tracers trace it, taking turns. ratio_vs_embree is the median over the rounds of ours / Embree's, both
-/// of one round, with that call of Embree's whose median is the best.
+/// For each scene and number of threads: all tracers build, taking turns, and the median counts. Then, for each set of
+/// rays, all calls of all tracers trace it, taking turns. ratio_vs_embree is the median over the rounds of ours / Embree's,
+/// both of one round, with that call of Embree's whose median is the best.
 
 #include <fmt/format.h>
 

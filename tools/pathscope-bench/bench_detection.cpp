@@ -3,10 +3,10 @@
 ///     time = moment at which the client has given the server up - moment of the signal that killed or froze it
 ///
 /// Both moments are of one clock, as client and servers are on one machine; the signal comes from a thread of its own, at a
-/// moment that nobody knows. A process that is killed closes its connections, and the end of one makes the client probe all. One
-/// that is frozen closes nothing: its silence has to be told from that of a busy one. Servers are processes that render; `idle`
-/// ones wait for work, `saturated` ones have more than their machine can do. Afterwards the largest herd is watched
-/// for a while, saturated and in peace: nobody may be given up.
+/// moment that nobody knows. A process that is killed closes its connections, and the end of one makes the client probe
+/// all. One that is frozen closes nothing: its silence has to be told from that of a busy one. Servers are processes that
+/// render; `idle` ones wait for work, `saturated` ones have more than their machine can do. Afterwards the largest herd is
+/// watched for a while, saturated and in peace: nobody may be given up.
 
 #include <fmt/format.h>
 #include <signal.h>
@@ -44,16 +44,6 @@ enum class Fault { killed, frozen };
 
 std::string_view word(Load load) { return load == Load::idle ? "idle" : "saturated"; }
 std::string_view word(Fault fault) { return fault == Fault::killed ? "killed" : "frozen"; }
-
-/// What people are told of each join and loss is nothing for a benchmark's terminal.
-class Silence {
-  public:
-    Silence() : before_(set_log_sink([](LogLevel, std::string_view) {})) {}
-    ~Silence() { set_log_sink(before_); }
-
-  private:
-    LogSink before_;
-};
 
 /// A client, and server processes that come and go.
 class Herd {
@@ -274,7 +264,8 @@ Result<Report> bench_detection(const BenchOptions& options) {
     if (!of_scene) return of_scene.error();
     const ClientJob job = sized(std::move(*of_scene), k_width, k_height, k_endless);
 
-    const Silence silence;
+    // What people are told of each join and loss is nothing for a benchmark's terminal.
+    const ScopedLogSink quiet([](LogLevel, std::string_view) {});
     std::vector<int> counts = options.servers.empty() ? std::vector{1, 8, 32} : options.servers;
     std::sort(counts.begin(), counts.end());
     Report report;

@@ -36,7 +36,9 @@ constexpr std::uint32_t k_speed_seed = 1;
 /// A picture in whole blocks, as many as the largest fleet has servers or a multiple, so that equal shares exist.
 constexpr int k_width = 256, k_height = 128;
 
-/// Of the crowd: about full HD.
+/// Of the crowd: as many blocks as full HD has at the usual size, each a quarter of that. What is asked for is how many
+/// tiles a client stands, not how many bytes.
+constexpr int k_crowd_block = 16;
 constexpr int k_crowd_columns = 60, k_crowd_rows = 34;
 
 /// Of whatever a ghost pretends to render.
@@ -137,11 +139,13 @@ double median_of(const std::vector<FrameFigures>& all, Figure figure) {
 Result<Json> measure_crowd(const BenchOptions& options) {
     if (options.ghosts == 0) return Json(nullptr);
     const Fleet fleet{options.ghosts, true, {k_unlimited_speed, 0}, k_speed_seed, 0};
-    const ClientConfig config = make_config(ScheduleKind::pull);
+    ClientConfig config = make_config(ScheduleKind::pull);
+    config.lease_time = 0;  // What is measured is the cost of a tile: one round each.
+    config.block_size = k_crowd_block;
     const double rounds = std::max(k_rounds_per_ghost * options.ghosts, 1.0 * k_crowd_columns * k_crowd_rows);
-    const double samples = rounds * k_block_size * k_block_size * config.round_samples;
+    const double samples = rounds * k_crowd_block * k_crowd_block * config.round_samples;
     const ClientJob job =
-        sized(ghost_job(), k_crowd_columns * k_block_size, k_crowd_rows * k_block_size, samples);
+        sized(ghost_job(), k_crowd_columns * k_crowd_block, k_crowd_rows * k_crowd_block, samples);
     std::vector<FrameFigures> all;
     for (int run = 0; run <= options.runs; ++run) {
         show_progress(fmt::format("{} ghosts: round {} of {}", options.ghosts, run, options.runs));
@@ -152,7 +156,7 @@ Result<Json> measure_crowd(const BenchOptions& options) {
     const double tiles = double(all.front().tiles);
     return Json{
         {"servers", options.ghosts},
-        {"block", k_block_size},
+        {"block", k_crowd_block},
         {"tiles", all.front().tiles},
         {"leases", median_of(all, [](const FrameFigures& f) { return double(f.leases); })},
         {"tiles_per_s", median_of(all, [=](const FrameFigures& f) { return tiles / f.render_s; })},

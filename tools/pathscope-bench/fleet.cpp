@@ -78,19 +78,6 @@ Result<void> finish(ClientSession& client, FrameFigures& figures) {
     return {};
 }
 
-/// Nobody reads that servers come and go.
-class Silence {
-  public:
-    Silence()
-        : before_(set_log_sink([this](LogLevel level, std::string_view sentence) {
-              if (level == LogLevel::warning) fmt::print(stderr, "warning: {}\n", sentence);
-          })) {}
-    ~Silence() { set_log_sink(before_); }
-
-  private:
-    LogSink before_;
-};
-
 }  // namespace
 
 double Fleet::samples_per_second() const {
@@ -100,7 +87,10 @@ double Fleet::samples_per_second() const {
 }
 
 Result<FrameFigures> render_frame(ClientConfig config, const ClientJob& job, const Fleet& fleet) {
-    const Silence silence;
+    const ScopedLogSink only_warnings([](LogLevel level, std::string_view sentence) {
+        if (level == LogLevel::warning)
+            fmt::print(stderr, "warning: {}\n", sentence);  // Servers come and go.
+    });
     config.listens = config.any_ports = true;
     config.min_servers = fleet.servers;
     EventStore store;

@@ -3,8 +3,8 @@
 ///
 ///   rate = sum over threads of (rays of the thread / CPU seconds of the thread)
 ///
-/// Why CPU time: on a machine with other users, the wall clock measures them as well. Threads are pinned, each to a processor of
-/// its own, and take batches of k_batch_rays off a common counter, so that none waits for another at the end.
+/// Why CPU time: on a machine with other users, the wall clock measures them as well. Threads are pinned, each to a
+/// processor of its own, and take batches of k_batch_rays off a common counter, so that none waits for another at the end.
 
 #include <span>
 #include <vector>

@@ -127,6 +127,12 @@ void add_cluster_options(CLI::App& app, RenderOptions& options) {
     app.add_option("--round", client.round_samples, "samples per pixel in one round (4)")
         ->check(CLI::Range(1, 4096))
         ->type_name("N");
+    app.add_option_function<double>(
+           "--lease-ms", [&](double ms) { client.lease_time = from_seconds(ms / 1000); },
+           fmt::format("work in one lease, while there is enough; 0 = one round each ({:g})",
+                       to_seconds(client.lease_time) * 1000))
+        ->check(CLI::Range(0.0, 60'000.0))
+        ->type_name("MS");
     add_lever(app, "--bvh", client.tree, "which tree finds hits");
     app.add_option("--threads", client.threads, "of the client's own rendering; 0 = all cores (0)")
         ->check(CLI::Range(0, 1024))

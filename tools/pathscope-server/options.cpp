@@ -20,14 +20,7 @@ void add_server_options(CLI::App& app, ServerConfig& config, std::string& mesh_c
                    "render no faster, in samples per second; 0 = no cap (0)")
         ->check(CLI::Range(0.0, 1e12))
         ->type_name("N");
-    app.add_option("--name", config.name, "for people (host name and process id)")
-        ->check(CLI::Validator(
-            [](const std::string& name) {
-                return name.empty() || name.size() > 64 ? std::string("a name has 1 to 64 bytes")
-                                                        : std::string();
-            },
-            "NAME"))
-        ->type_name("NAME");
+    add_name(app, config.name);
     app.add_option("--cache", config.cache_folder, "folder for scene files, by content; safe to delete")
         ->type_name("DIR");
     add_mesh_cache(app, mesh_cache);

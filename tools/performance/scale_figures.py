@@ -1,25 +1,9 @@
 """The figure of the benchmark `scale`: efficiency against the number of servers, one panel for servers that are alike, one for those that are not."""
-from performance.plot import SOFT, Axis, Canvas, Label, Panel, Picture, lay_out_panels, looks_of
+from performance.plot import SOFT, Axis, Picture
+from performance.server_panels import Span, draw_panels, panels_of, server_axis
 
 LABEL_ROOM = 0.28  # of the axis, right of the last point
 TICKS = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
-
-
-def series_of(rows, speeds):
-    """name -> points (servers, row), by rising number of servers."""
-    series = {}
-    for row in rows:
-        if row["speeds"] == speeds:
-            name = row["schedule"] if row["kind"] == "ghosts" else "processes"
-            series.setdefault(name, []).append((row["servers"], row))
-    return {name: sorted(points, key=lambda point: point[0]) for name, points in series.items()}
-
-
-def server_axis(rows):
-    """Powers of two with room on both sides; one number of servers alone stands near the left."""
-    counts = sorted({row["servers"] for row in rows})
-    low, high = 0.8 * counts[0], max(counts[-1], 2 * counts[0])
-    return Axis(low, high * (high / low) ** (LABEL_ROOM / (1 - LABEL_ROOM)), counts)
 
 
 def efficiency_axis(rows):
@@ -29,31 +13,17 @@ def efficiency_axis(rows):
     return Axis(low, high, [tick for tick in TICKS if low <= tick <= high])
 
 
-def draw(panel, series, looks):
-    """A bar spans the rounds; the marker stands at their median."""
+def span_of(row):
+    return Span(row["efficiency_min"], row["efficiency"], row["efficiency_max"], f"{row['efficiency']:.3f}")
+
+
+def draw_rule(panel):
     panel.canvas.line([(panel.left, panel.y(1)), (panel.right, panel.y(1))], SOFT, dash="5 4")
-    labels = []
-    for name, points in series.items():
-        panel.canvas.line([(panel.x(servers), panel.y(row["efficiency"])) for servers, row in points], looks[name].colour, 2)
-        for servers, row in points:
-            x = panel.x(servers)
-            panel.canvas.line([(x, panel.y(max(0.01, row["efficiency_min"]))), (x, panel.y(row["efficiency_max"]))], looks[name].colour)
-            panel.canvas.marker(x, panel.y(row["efficiency"]), looks[name], f"{servers} servers, {name}: {row['efficiency']:.3f}")
-        servers, row = points[-1]
-        labels.append(Label(panel.x(servers), panel.y(row["efficiency"]), name, looks[name].colour))
-    panel.draw_labels(labels)
 
 
 def pictures(rows):
-    panels = {speeds: series_of(rows, speeds) for speeds in ("equal", "lognormal")}
-    panels = {speeds: series for speeds, series in panels.items() if series}
-    looks = looks_of(list(dict.fromkeys(name for series in panels.values() for name in series)))
-    height, boxes = lay_out_panels(len(panels))
-    canvas = Canvas(height)
-    for (speeds, series), box in zip(panels.items(), boxes):
-        panel = Panel(canvas, *box, server_axis(rows), efficiency_axis(rows))
-        panel.draw_axes(f"speeds: {speeds}", "servers", "efficiency")
-        draw(panel, series, looks)
+    panels = panels_of(rows, "speeds", ("equal", "lognormal"), lambda row: row["schedule"] if row["kind"] == "ghosts" else "processes")
+    canvas = draw_panels(panels, ("speeds", "efficiency"), server_axis(rows, LABEL_ROOM), efficiency_axis(rows), span_of, draw_rule)
     most = max(row["servers"] for row in rows)
     ends = ", ".join(f"{row['efficiency']:.2f} with {row['schedule']} and {row['speeds']} speeds"
                      for row in rows if row["servers"] == most and row["kind"] == "ghosts")

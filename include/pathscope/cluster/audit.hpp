@@ -1,7 +1,7 @@
 #pragma once
-/// Audits: a share of the rounds is rendered a second time, by another server, and compared bit by bit.
+/// Audits: a share of the results is rendered a second time, by another server, and compared bit by bit.
 ///
-///     chosen(round)  <=>  hash(secret, round) < share * 2^64          so who renders cannot know which
+///     chosen(first round)  <=>  hash(secret, round) < share * 2^64    so who renders cannot know which
 ///
 ///     result of A is merged        second opinion of B          the client's own, which is the truth
 ///        open  -------------------->  held by B  --- differs --->  disputed  --->  who differs from it lied
@@ -20,7 +20,7 @@
 /// row (Ledger::new_lease_id) and are not in its account.
 /// Bounded: an item for each chosen round that is merged and not settled.   Cost: O(log n) per call, revoke and forget O(n).
 /// No clock: `now` is an argument and never falls.   Thread safety: one thread at a time.
-/// Test: tests/cluster/test_audit.cpp, tests/session/test_simulation.cpp, tests/system/test_audit.py
+/// Test: tests/cluster/test_audit.cpp, tests/session/test_liars.cpp, test_simulation.cpp, tests/system/test_audit.py
 
 #include <algorithm>
 #include <cstdint>
@@ -41,9 +41,9 @@ struct AuditParams {
     std::uint64_t secret = 0;  ///< Of the client.
 };
 
-/// A round that was merged, and whose result it was.
+/// A result of one or more rounds that was merged, and whose it was.
 struct AuditedRound {
-    RoundKey round;
+    RoundKey round;  ///< The first.
     SampleRange samples;
     ServerId author;
     Digest result{};             ///< Hash of it.

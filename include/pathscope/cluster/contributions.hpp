@@ -5,7 +5,7 @@
 ///
 /// Why not one sum for each server and pixel: it would be the frame times the servers in memory, for an event that hardly
 /// ever happens. With few rounds for each unit, most units hold nothing of the liar and stay.
-/// Memory: 48 bytes for each pair of a unit and a server that gave to it.
+/// Memory: 56 bytes for each pair of a unit and a server that gave to it.
 /// Thread safety: one thread at a time.   Test: tests/cluster/test_audit.cpp
 
 #include <algorithm>
@@ -20,9 +20,10 @@ namespace pathscope {
 
 struct Contribution {
     ServerId server;
-    std::uint64_t rounds = 0, samples = 0, rays = 0, nonfinite = 0, saturated = 0;
+    std::uint64_t tiles = 0, rounds = 0, samples = 0, rays = 0, nonfinite = 0, saturated = 0;
 
     Contribution& operator+=(const Contribution& other) {
+        tiles += other.tiles;
         rounds += other.rounds;
         samples += other.samples;
         rays += other.rays;

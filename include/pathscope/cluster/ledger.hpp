@@ -3,8 +3,9 @@
 ///
 /// The work of an epoch is a number of units (with strategy `blocks` a unit is a block of pixels; the ledger
 /// does not know). Each unit needs the samples [0, samples) once, cut into rounds of round_samples; the last
-/// may be shorter. A round is *granted* to a server as a lease with a deadline, and *committed* by the first
-/// result that fits, or granted again when the lease ends without one:
+/// may be shorter. A round is *granted* to a server as a lease with a deadline, alone or with those that follow it
+/// (cluster/lease_size.hpp), and *committed* by the first result that fits, or granted again when the lease ends
+/// without one:
 ///
 ///                 grant                       commit
 ///        fresh  --------->  held by 1..2  -------------->  committed
@@ -17,7 +18,9 @@
 ///   rounds    each is committed at most once; when complete(), exactly once
 ///   leases    granted = outstanding + returned + superseded + released + expired + revoked + dropped
 ///   results   received = accepted + duplicates + stale + unknown + mismatched
-///   between   accepted = returned + late;  committed = accepted + restored - undone
+///   between   accepted = returned + late;  committed = rounds of accepted results + restored - undone
+///   runs      a result is taken whole or not at all: it has no round that is committed already;
+///             two leases that are outstanding and share a round have all their rounds in common
 ///   bounded   records exist only for rounds that were granted and are not committed, at most
 ///             k_leases_per_round each; a committed round is remembered by what is *absent*
 ///
@@ -89,19 +92,34 @@ struct RoundKey {
     auto operator<=>(const RoundKey&) const = default;
 };
 
+/// That round and those that follow it in its unit, so many in all.
+struct RoundRun {
+    RoundKey first;
+    std::uint32_t rounds = 1;
+
+    explicit RoundRun(RoundKey begin, std::uint32_t size = 1) : first(begin), rounds(size) {}
+    [[nodiscard]] RoundKey at(std::uint32_t i) const { return {first.unit, first.index + i}; }
+    [[nodiscard]] bool contains(RoundKey round) const {
+        return round.unit == first.unit && round.index - first.index < rounds;
+    }
+};
+
 struct SampleRange {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
     bool operator==(const SampleRange&) const = default;
 };
 
-/// Requires: round.index < plan.rounds_of(round.unit).
-[[nodiscard]] SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round);
+/// Requires: the rounds are in the plan, at least one.
+[[nodiscard]] SampleRange samples_of(const LedgerPlan& plan, const RoundRun& run);
+[[nodiscard]] inline SampleRange samples_of_round(const LedgerPlan& plan, RoundKey round) {
+    return samples_of(plan, RoundRun(round));
+}
 
 /// How long the client's own renderer may hold a round: if it is gone, so is the account.
 inline constexpr TimeNs k_no_deadline = TimeNs{1} << 61;
 
-/// A round granted to one server until a deadline.
+/// Rounds granted to one server until a deadline.
 struct Lease {
     LeaseId id;
     Epoch epoch;
@@ -111,7 +129,7 @@ struct Lease {
     ServerId server;
     TimeNs granted = 0;
     TimeNs deadline = 0;
-    bool copy = false;  ///< A second lease on a straggler's round.
+    bool copy = false;  ///< A second lease on a straggler's rounds.
 };
 
 /// What a result says it is; the ledger believes nothing of it.
@@ -127,8 +145,8 @@ struct ResultClaim {
 };
 
 enum class Verdict {
-    accepted,     ///< Merge it: the first result of its round.
-    duplicate,    ///< The round was committed already.
+    accepted,     ///< Merge it: the first result of its rounds.
+    duplicate,    ///< One of its rounds was committed already.
     stale_epoch,  ///< Of an old epoch.
     unknown,      ///< No such lease was granted, or so long ago that it is forgotten.
     mismatched,   ///< Another unit, range or server than its lease says.
@@ -145,7 +163,8 @@ struct Commit {
     Verdict verdict = Verdict::unknown;
     bool late = false;              ///< Accepted after its lease had ended.
     TimeNs since_grant = 0;         ///< Of an accepted one.
-    std::vector<Lease> superseded;  ///< Leases of the same round that nobody needs any more: cancel them.
+    std::uint32_t rounds = 0;       ///< That it brought.
+    std::vector<Lease> superseded;  ///< Leases with a round of it, which nobody needs any more: cancel them.
 };
 
 /// Everything that was ever counted, over all epochs.
@@ -166,10 +185,11 @@ struct LedgerCounts {
     std::uint64_t unknown = 0;
     std::uint64_t mismatched = 0;
     // Among them.
-    std::uint64_t late = 0;         ///< Accepted after the lease had ended.
-    std::uint64_t reallocated = 0;  ///< Granted again, to another server than the last.
-    std::uint64_t copied = 0;       ///< Granted as a second lease.
-    std::uint64_t undone = 0;       ///< Committed rounds that were opened again.
+    std::uint64_t late = 0;             ///< Accepted after the lease had ended.
+    std::uint64_t rounds_accepted = 0;  ///< Of accepted results.
+    std::uint64_t reallocated = 0;      ///< Granted again, to another server than the last.
+    std::uint64_t copied = 0;           ///< Granted as a second lease.
+    std::uint64_t undone = 0;           ///< Committed rounds that were opened again.
 };
 
 /// What a checkpoint keeps of a unit: the rounds [0, reached) are committed, except the missing ones.
@@ -209,11 +229,18 @@ class Ledger {
     /// No more grants; results of leases already granted are still welcome.
     void stop() { stopped_ = true; }
 
-    /// Grants an open round: a reopened one, or the unit's next fresh one. Returns nothing if it is not open.
-    /// Requires: duration > 0.
-    std::optional<Lease> grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
+    /// The open rounds from this one on, at most so many, that one lease may hold: fresh ones, or reopened ones that
+    /// the same server held last. None if it is not open itself.
+    [[nodiscard]] RoundRun grantable(RoundKey first, std::uint32_t most) const;
 
-    /// Grants a round that another server holds, so that the quicker one counts. Returns nothing unless
+    /// Grants open rounds: reopened ones, or the unit's next fresh ones. Returns nothing if they are not grantable().
+    /// Requires: duration > 0.
+    std::optional<Lease> grant(ServerId server, const RoundRun& run, TimeNs now, TimeNs duration);
+    std::optional<Lease> grant(ServerId server, RoundKey round, TimeNs now, TimeNs duration) {
+        return grant(server, RoundRun(round), now, duration);
+    }
+
+    /// Grants what another server holds with this round, so that the quicker one counts. Returns nothing unless
     /// exactly one other server holds it.
     std::optional<Lease> grant_copy(ServerId server, RoundKey round, TimeNs now, TimeNs duration);
 
@@ -240,7 +267,9 @@ class Ledger {
     [[nodiscard]] RoundKey round_at(std::uint32_t unit, std::uint32_t first) const {
         return {unit, (first - plan_.first_sample(unit)) / plan_.round_samples_of(unit)};
     }
-    [[nodiscard]] RoundKey key_of(const Lease& lease) const { return round_at(lease.unit, lease.first); }
+    /// Nothing if these samples are not a number of whole rounds of the plan.
+    [[nodiscard]] std::optional<RoundRun> rounds_in(std::uint32_t unit, SampleRange samples) const;
+    [[nodiscard]] RoundRun rounds_of(const Lease& lease) const;
 
     /// Rounds that may be granted or were; grows only by open().
     [[nodiscard]] std::uint64_t rounds_open() const { return open_; }
@@ -251,6 +280,9 @@ class Ledger {
 
     /// The unit's lowest round that was never granted.
     [[nodiscard]] std::optional<RoundKey> next_fresh(std::uint32_t unit) const;
+
+    /// Open rounds that nobody holds; open-ended: more than there will ever be time for.
+    [[nodiscard]] std::uint64_t rounds_waiting() const { return open_ - begun_ + reopened_.size(); }
 
     /// Rounds whose leases ended without a result, in that order: to be given out before any fresh one.
     [[nodiscard]] const std::deque<RoundKey>& reopened() const { return reopened_; }
@@ -302,11 +334,14 @@ class Ledger {
 
     [[nodiscard]] bool committed(RoundKey round) const;
     [[nodiscard]] std::uint32_t samples_before(std::uint32_t unit, std::uint32_t rounds) const;
-    Lease hold(Active& active, ServerId server, RoundKey round, TimeNs now, TimeNs duration,
-               UnitReason reason);
-    void forget_one_ended(Active& active);
+    Lease hold(ServerId server, const RoundRun& run, TimeNs now, TimeNs duration, UnitReason reason);
+    void forget_one_ended(const Active& active);
+    void forget(LeaseId lease);
+    [[nodiscard]] std::vector<LeaseId> others_beside(const Lease& lease, const RoundRun& run) const;
+    void supersede(LeaseId lease, const RoundRun& by, Commit& commit, TimeNs now);
     void refuse(Verdict verdict, const ResultClaim& claim, TimeNs now);
     void end(Record& record);
+    void note_holders(const Active& active);
     void end_without_result(Record& record, UnitReason reason, TimeNs now);
     void close_again(RoundKey round);
     [[nodiscard]] Result<void> audit_balances() const;
@@ -323,6 +358,7 @@ class Ledger {
     std::map<RoundKey, Active> active_;
     std::map<LeaseId, Record> records_;
     std::set<std::pair<TimeNs, LeaseId>> deadlines_;  ///< Of outstanding leases.
+    std::set<LeaseId> uncopied_;                      ///< Outstanding, and nobody else holds their rounds.
     std::map<ServerId, std::uint32_t> held_;          ///< Outstanding leases by server, no zeros.
     std::deque<RoundKey> reopened_;
     std::size_t outstanding_ = 0;
@@ -330,7 +366,7 @@ class Ledger {
     std::uint64_t committed_ = 0;  ///< Rounds of this epoch.
     std::uint64_t begun_ = 0;
     std::uint64_t restored_ = 0;
-    std::uint64_t accepted_before_ = 0;  ///< counts_.accepted when this epoch began.
+    std::uint64_t accepted_before_ = 0;  ///< counts_.rounds_accepted when this epoch began.
     std::uint64_t undone_before_ = 0;    ///< counts_.undone then.
     std::uint64_t last_lease_ = 0;
     std::uint64_t last_lease_before_ = 0;  ///< last_lease_ when this epoch began.

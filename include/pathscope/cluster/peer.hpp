@@ -8,9 +8,9 @@
 ///     from any of these: --lost--> DEAD --removed--> GONE
 ///
 /// Busy or idle is not a state: a READY server is busy while the ledger says it holds a lease. One truth.
-/// SUSPECT keeps its leases (a copy of its rounds may go to others); STUCK lives and loses them (progress_watch.hpp); DEAD loses them too, its id is never used
-/// again, and if it speaks it has to say HELLO anew. What the table does not list is refused and counted. No
-/// clock, no socket. Thread safety: one thread at a time.   Test: tests/cluster/test_peer.cpp
+/// SUSPECT keeps its leases (a copy of its rounds may go to others); STUCK lives and loses them (progress_watch.hpp); DEAD
+/// loses them too, its id is never used again, and if it speaks it has to say HELLO anew. What the table does not list is
+/// refused and counted. No clock, no socket. Thread safety: one thread at a time.   Test: tests/cluster/test_peer.cpp
 
 #include <array>
 #include <cstdint>

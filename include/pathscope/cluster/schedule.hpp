@@ -16,6 +16,7 @@
 /// Thread safety: one thread at a time.   Test: tests/cluster/test_schedule.cpp
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -103,11 +104,13 @@ class Schedule {
     std::uint64_t rounds_open_ = 0;  ///< When the walks were begun.
 };
 
-/// The straggler's round that a server with nothing else to do had better compute too: the oldest lease that
+/// The straggler's lease that a server with nothing else to do had better compute too: the oldest that
 /// only one other server holds, if it has run longer than k_straggler_factor times what this server would
-/// need. Spark speculates at 1.5 times the median; the same factor here.
+/// need for it. Spark speculates at 1.5 times the median; the same factor here.
+/// own_estimate(lease): that time; nothing if it is not known.
 inline constexpr double k_straggler_factor = 1.5;
-[[nodiscard]] std::optional<RoundKey> pick_straggler(const Ledger& ledger, ServerId server, TimeNs now,
-                                                     TimeNs own_estimate);
+[[nodiscard]] std::optional<Lease> pick_straggler(
+    const Ledger& ledger, ServerId server, TimeNs now,
+    const std::function<std::optional<TimeNs>(const Lease&)>& own_estimate);
 
 }  // namespace pathscope

@@ -18,8 +18,8 @@ namespace pathscope {
 /// place cannot be written to.
 [[nodiscard]] Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
-/// Removes what the functions around this one left beside `path` when their program was killed. Requires: no other program writes
-/// `path`; it would have to write it again.
+/// Removes what the functions around this one left beside `path` when their program was killed. Requires: no other program
+/// writes `path`; it would have to write it again.
 void remove_abandoned_parts(const std::filesystem::path& path);
 
 /// The one question that permissions, full disks and read-only mounts all answer: can a file be made there? Leaves a

@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,7 +28,6 @@ using Digest = std::array<std::uint8_t, 32>;
 class Hasher {
   public:
     Hasher();
-    ~Hasher();
     Hasher(const Hasher&) = delete;
     Hasher& operator=(const Hasher&) = delete;
 
@@ -38,8 +36,12 @@ class Hasher {
     [[nodiscard]] Digest finish();  ///< Once.
 
   private:
-    struct State;
-    std::unique_ptr<State> state_;
+    /// libsodium's, in place: a message of a few hundred bytes would else cost more to allocate for than to hash.
+    struct alignas(64) State {
+        std::array<std::byte, 384> bytes;
+    };
+    State state_;
+    bool finished_ = false;
 };
 
 }  // namespace pathscope

@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace pathscope {
 
@@ -16,6 +17,18 @@ using LogSink = std::function<void(LogLevel, std::string_view sentence)>;
 
 /// Replaces the sink; an empty one restores stderr. Returns the sink that was set before.
 LogSink set_log_sink(LogSink sink);
+
+/// The same, until the end of the scope.
+class ScopedLogSink {
+  public:
+    explicit ScopedLogSink(LogSink sink) : before_(set_log_sink(std::move(sink))) {}
+    ~ScopedLogSink() { set_log_sink(std::move(before_)); }
+    ScopedLogSink(const ScopedLogSink&) = delete;
+    ScopedLogSink& operator=(const ScopedLogSink&) = delete;
+
+  private:
+    LogSink before_;
+};
 
 void log_note(std::string_view sentence);
 void log_warning(std::string_view sentence);

@@ -63,7 +63,7 @@ struct PixelSum {
         b += other.b;
         return *this;
     }
-    friend constexpr PixelSum operator+(PixelSum a, const PixelSum& b) { return a += b; }
+    friend constexpr PixelSum operator+(PixelSum sum, const PixelSum& other) { return sum += other; }
     friend constexpr bool operator==(const PixelSum&, const PixelSum&) = default;
 };
 

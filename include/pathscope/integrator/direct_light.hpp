@@ -4,8 +4,9 @@
 ///   ∫ f Le V cos dw  ≈  w_l f Le V cos / p_l   by a sampled light (sample_direct_light), and
 ///                       w_b f Le cos / p_b     by the direction the path takes anyway (emission_towards)
 ///
-/// with w_l + w_b = 1 for each direction (sampling/mis.hpp); p_l counts all n light samples: p_l = n P(light) pdf. With MIS off the light sample counts alone, and an emitter
-/// that the path runs into counts only after the camera or a delta lobe, which no light sample can reach.
+/// with w_l + w_b = 1 for each direction (sampling/mis.hpp); p_l counts all n light samples: p_l = n P(light) pdf. With MIS
+/// off the light sample counts alone, and an emitter that the path runs into counts only after the camera or a delta lobe,
+/// which no light sample can reach.
 /// Why both: a small light is found by sampling lights, a mirror-like surface finds a large one by itself (Veach's
 /// plates).
 /// Units: radiance. The path's throughput is the caller's.

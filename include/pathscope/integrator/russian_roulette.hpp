@@ -17,9 +17,9 @@
 /// and 4 in a Cornell box, a Sponza and a conference room alike: k_efficiency_gain. So a path goes on unharmed while T is
 /// above a third, from the first vertex on, and below that its survivors carry a third.
 /// What it buys against `throughput` (Lambert, 8 bounces, 64 samples, variance times processor time): a factor of 2.7 in
-/// the Sponza, whose dark surfaces no longer send three bounces each, 1.3 in the conference room, and nothing in the Cornell box, whose
-/// surfaces are bright. Sample for sample dark surfaces become noisier, by a factor of 1.4 in relative variance in the
-/// Sponza, for a third of the time. So it is a lever, and not part of the best setting.
+/// the Sponza, whose dark surfaces no longer send three bounces each, 1.3 in the conference room, and nothing in the
+/// Cornell box, whose surfaces are bright. Sample for sample dark surfaces become noisier, by a factor of 1.4 in relative
+/// variance in the Sponza, for a third of the time. So it is a lever, and not part of the best setting.
 /// Units: throughput is a ratio (radiance out / radiance in), so q is dimensionless.
 /// See:   Arvo & Kirk 1990, "Particle Transport and Image Synthesis"; P_RR in Yan's GAMES101; Veach 1997, section 10.4,
 ///        and Rath et al. 2022, "EARS: Efficiency-Aware Russian Roulette and Splitting", who estimate what is constant here.

@@ -3,7 +3,8 @@
 ///
 ///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
 ///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
-///   best:     light by a tree where there are many, else by power, two samples of it per vertex, BRDF sampling, MIS by the power heuristic, roulette by throughput, Owen-scrambled Sobol.
+///   best:     light by a tree where there are many, else by power, two samples of it per vertex, BRDF sampling, MIS by the
+///             power heuristic, roulette by throughput, Owen-scrambled Sobol.
 ///
 /// Why: both converge to the same image, so a lesson can ask what each lever buys.
 /// Thread safety: values.   Test: tests/integrator/test_settings.cpp

@@ -1,5 +1,6 @@
 #pragma once
-/// Eight floats or doubles at once, four floats, and as many floats as fit: with its parts in math/simd, the only headers with intrinsics.
+/// Eight floats or doubles at once, four floats, and as many floats as fit: with its parts in math/simd, the only headers
+/// with intrinsics.
 ///
 ///     const Float8 t = (load(plane) - broadcast(origin)) * broadcast(inverse);
 ///     for (Lanes met = at_most(t_near, t_far); any(met); met = without_first(met)) visit(first(met));

@@ -5,10 +5,10 @@
 ///     # TYPE pathscope_queue_seconds gauge
 ///     pathscope_queue_seconds 12.5
 ///
-/// Names follow the rules of prometheus.io/docs/practices/naming: counters end in _total, units are base units (seconds, bytes).
-/// Every counter of probe/counter.hpp is there by its own name; docs/cluster.md lists all others.
-/// Bounded: a label takes values from a fixed list, but for id and name of a server, of which at most k_most_servers_shown are
-/// shown at once, the oldest of those that live; totals and distributions of the others still count in the totals.
+/// Names follow the rules of prometheus.io/docs/practices/naming: counters end in _total, units are base units (seconds,
+/// bytes). Every counter of probe/counter.hpp is there by its own name; docs/cluster.md lists all others.
+/// Bounded: a label takes values from a fixed list, but for id and name of a server, of which at most k_most_servers_shown
+/// are shown at once, the oldest of those that live; totals and distributions of the others still count in the totals.
 /// Thread safety: pure; the store may be in use.   Test: tests/metrics/test_exposition.cpp
 
 #include <cstddef>

@@ -24,7 +24,7 @@ class RateWindow {
     static constexpr TimeNs k_window = 10 * k_second_ns;
     static constexpr TimeNs k_spacing = k_second_ns / 4;
 
-    /// Takes the totals of this moment, if the last one taken is long enough ago.
+    /// Takes the totals of this moment, if the last one taken is long enough ago. Requires: none falls (totals_ever()).
     void add(const CounterTotals& totals, TimeNs now);
 
     /// Up to the last moment taken; zeros while there are fewer than two.

@@ -1,8 +1,8 @@
 #pragma once
 /// What is counted, by name: one table for the event store, `--stats`, the window and lesson checks.
 ///
-/// Every counter only rises, but for EventStore::take_back. A total exists for the whole run, and one per server (server 0 is the client and
-/// its own renderer). Test: tests/probe/test_event_store.cpp
+/// Every counter only rises, but for EventStore::take_back. A total exists for the whole run, and one per server (server 0
+/// is the client and its own renderer). Test: tests/probe/test_event_store.cpp
 
 #include <cstddef>
 

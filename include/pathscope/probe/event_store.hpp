@@ -54,6 +54,7 @@ using CounterTotals = std::array<std::uint64_t, k_counters>;
 struct LatencySummary {
     std::uint64_t count = 0;
     double mean_ms = 0, p50_ms = 0, p95_ms = 0, largest_ms = 0;  ///< 0 while count is 0.
+    double sum_ms = 0;                                           ///< Never falls.
 };
 
 /// What the store knows about one server (0: the client's own renderer).
@@ -114,6 +115,8 @@ class EventStore {
     // -- Readers --------------------------------------------------------------------------------------------
     [[nodiscard]] std::uint64_t total(Counter counter) const;
     [[nodiscard]] CounterTotals totals() const;
+    /// With what was taken back since: numbers that never fall, as who draws rates of them expects.
+    [[nodiscard]] CounterTotals totals_ever() const;
     [[nodiscard]] std::optional<ServerSummary> server(ServerId server) const;
     [[nodiscard]] std::vector<ServerSummary> servers()
         const;  ///< By rising id, those that were named or counted.
@@ -155,8 +158,11 @@ class EventStore {
     std::vector<Event> ring_;   ///< Event n is at (n - 1) % limits_.events.
     std::uint64_t recorded_ = 0;
     CounterTotals totals_{};
+    CounterTotals taken_back_{};
     CounterTotals sampled_{};
     std::map<ServerId, ServerTotals> servers_;
+    std::map<ServerId, ServerTotals>::value_type* last_counted_ =
+        nullptr;  ///< Who comes, comes several times in a row.
 };
 
 }  // namespace pathscope

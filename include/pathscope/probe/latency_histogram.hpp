@@ -24,6 +24,7 @@ class LatencyHistogram {
     void add(TimeNs duration);
 
     [[nodiscard]] std::uint64_t count() const { return count_; }
+    [[nodiscard]] TimeNs sum() const { return sum_; }
 
     /// The value that a fraction q of all are at or below (nearest rank). Nothing while empty.
     /// Requires: 0 <= q <= 1.

@@ -150,6 +150,7 @@ struct Pong {
     TimeNs sent_ns = 0;
     std::uint64_t progress = 0;
     std::uint32_t queue = 0;
+    std::uint32_t at_once = 1;  ///< Leases that the sender works on side by side; may be left out.
     bool operator==(const Pong&) const = default;
 };
 

@@ -16,14 +16,14 @@
 ///
 ///   tan(u.x Ω/2) = |A · B×m| / (A·m + B·m)   =>   x = det cos h - (A + B)·C sin h,   y = (1 + A·B) sin h
 ///
-/// with det = |A · B×C| and h = u.x Ω/2. The second number chooses on the arc from B to C' such that equal areas have equal chances.
-/// All of it is sums of A, B, C with weights >= 0, and those divided by the corners' distances are barycentric: no angle is
-/// computed but h, and no ray is shot back at the triangle.
+/// with det = |A · B×C| and h = u.x Ω/2. The second number chooses on the arc from B to C' such that equal areas have equal
+/// chances. All of it is sums of A, B, C with weights >= 0, and those divided by the corners' distances are barycentric: no
+/// angle is computed but h, and no ray is shot back at the triangle.
 ///
 /// In double, from differences of floats that are exact: thin triangles seen edge-on keep their digits. The numbers that
 /// need an angle are floats (unit_circle.hpp); so Ω has an error below 4e-7 of itself.
-/// See: Arvo 1995, "Stratified Sampling of Spherical Triangles"; Peters 2021, "BRDF Importance Sampling for Polygonal Lights",
-/// whose Ω/2 replaces Arvo's vertex angles; Van Oosterom & Strackee 1983, "The Solid Angle of a Plane Triangle".
+/// See: Arvo 1995, "Stratified Sampling of Spherical Triangles"; Peters 2021, "BRDF Importance Sampling for Polygonal
+/// Lights", whose Ω/2 replaces Arvo's vertex angles; Van Oosterom & Strackee 1983, "The Solid Angle of a Plane Triangle".
 /// Thread safety: values.   Test: tests/sampling/test_spherical_triangle.cpp
 
 #include <algorithm>

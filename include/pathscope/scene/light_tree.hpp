@@ -17,7 +17,8 @@
 /// Not done: samples of several subtrees at once (the "adaptive splitting" of the paper); several samples per vertex, spread
 /// over the tree by their lattice, serve the same purpose (integrator/direct_light.hpp).
 /// What it buys against picking by power (32 samples, relative variance times processor time): a factor of 1.2 in the
-/// conference room (12 lights), 1.3 for Veach's spheres, 1.4 for four lamps over plates, and 15 in a house of 192 lamps behind walls.
+/// conference room (12 lights), 1.3 for Veach's spheres, 1.4 for four lamps over plates, and 15 in a house of 192 lamps
+/// behind walls.
 ///
 /// Units: scene units; intensity W/sr, as luminance.
 /// See: Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"; the BVHLightSampler of

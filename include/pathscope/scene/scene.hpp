@@ -59,9 +59,9 @@ struct SceneBuild {
     TreeKind tree = TreeKind::wide;
 };
 
-/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. Materials emit if the file lists emissive_mtl, or no
-/// light at all (a bare .obj). A scene without light is black, and said to be, but is no error.
-/// Refuses an environment map that is none, and a scene too large or too bright for floats. Requires: lights as
+/// Adds quads and spheres to the parts, decides which materials emit, builds tree and light table. Materials emit if the
+/// file lists emissive_mtl, or no light at all (a bare .obj). A scene without light is black, and said to be, but is no
+/// error. Refuses an environment map that is none, and a scene too large or too bright for floats. Requires: lights as
 /// parse_scene_file gives them, parts as load_scene_parts does.
 [[nodiscard]] Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBuild& build = {});
 

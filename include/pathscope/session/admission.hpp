@@ -34,4 +34,10 @@ struct BitsMisfit {
 };
 [[nodiscard]] std::optional<BitsMisfit> bits_misfit(const BitsIdentity& client, const BitsIdentity& server);
 
+/// What to answer to the HELLO of a server of such bits; nothing if it may take part. relaxed: bits may differ.
+/// same_before: whether they were the client's by an earlier HELLO of this very server, whose program is the same still.
+[[nodiscard]] std::optional<message::Reject> reject_bits(const std::optional<BitsMisfit>& misfit,
+                                                         bool relaxed,
+                                                         std::optional<bool> same_before = std::nullopt);
+
 }  // namespace pathscope

@@ -1,7 +1,7 @@
 #pragma once
 /// How a client session runs: where it listens, which servers it starts, how it hands out work and when it stops.
-/// None of this changes a pixel, but for `strategy` and `sampling`; what else does is in render_state.hpp. How many samples a block gets
-/// is decided here alone, so that servers need not know the rule.
+/// None of this changes a pixel, but for `strategy` and `sampling`; what else does is in render_state.hpp. How many samples
+/// a block gets is decided here alone, so that servers need not know the rule.
 
 #include <array>
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include "pathscope/cluster/audit.hpp"
 #include "pathscope/cluster/conduct.hpp"
 #include "pathscope/cluster/failure_detector.hpp"
+#include "pathscope/cluster/lease_size.hpp"
 #include "pathscope/cluster/schedule.hpp"
 #include "pathscope/core/clock.hpp"
 #include "pathscope/net/security.hpp"
@@ -21,7 +22,8 @@
 
 namespace pathscope {
 
-inline constexpr std::array k_default_ports{5555, 5556, 5557};  ///< input, monitor, frames
+inline constexpr std::array k_default_ports{5555, 5556, 5557};        ///< input, monitor, frames
+inline constexpr std::array k_default_relay_ports{6555, 6556, 6557};  ///< The same, where a relay listens.
 
 /// With them, only listed servers come in, and everything is encrypted (net/security.hpp).
 struct ClientKeys {
@@ -54,6 +56,8 @@ struct ClientConfig {
     UnitOrder order = UnitOrder::spiral;
     int block_size = 32;
     std::uint32_t round_samples = 4;
+    TimeNs lease_time =
+        k_lease_time;  ///< Of work in one lease, if there is enough (lease_size.hpp); 0 = one round.
     SamplingRule sampling{};
 
     int threads = 0;                 ///< Of the client's own rendering; 0 = all cores.

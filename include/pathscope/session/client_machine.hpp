@@ -74,9 +74,10 @@ class ClientWorld {
 
 class ClientMachine {
   public:
-    /// session: random, not 0; tells this run from an earlier one. `store` and `world` outlive the machine.
+    /// session: random, not 0; tells this run from an earlier one. `store`, `world` and `relayed` outlive the machine.
+    /// relayed: what servers are given, in place of a frame; then this machine renders nothing itself (relay_machine.hpp).
     ClientMachine(const ClientConfig& config, ClientJob job, std::uint64_t session, EventStore& store,
-                  ClientWorld& world, TimeNs now);
+                  ClientWorld& world, TimeNs now, IndirectWork* relayed = nullptr);
 
     /// Takes up a checkpoint; an error if it is of other work. Requires: nothing has happened yet.
     [[nodiscard]] Result<void> resume(const CheckpointFile& file);
@@ -112,6 +113,21 @@ class ClientMachine {
     /// The end of the session: local servers shall end, others shall look for the next client.
     void say_goodbye(TimeNs now);
 
+    // -- For a relay: client_relayed.cpp --------------------------------------------------------------------
+
+    /// As change_state(), where the scene's files may be others.
+    void change_scene(RenderState state, std::shared_ptr<const Scene> scene, SceneDepot depot, TimeNs now);
+    /// What leases ask for from here on. Who is admitted does not depend on it.
+    void set_strategy(Strategy strategy) { strategy_ = strategy; }
+    /// Leases whose results nobody wants any more.
+    void withdraw(const std::vector<Lease>& leases);
+    /// How many leases the servers could hold, all together.
+    [[nodiscard]] std::size_t leases_wanted() const;
+    /// Servers that may be given work and hold this state.
+    [[nodiscard]] int servers_in_step() const;
+    /// Rises while servers work, as far as they told.
+    [[nodiscard]] std::uint64_t work_seen() const { return work_seen_; }
+
     // -- View -----------------------------------------------------------------------------------------------
 
     /// Nothing is left to wait for: the image is finished, or the time limit was reached and every block has samples.
@@ -145,7 +161,11 @@ class ClientMachine {
         Turnaround turnaround{};  ///< Of leases since `moved`.
         TimeNs moved = 0;         ///< When it was stuck last: what it held then says nothing of its speed.
         TimeNs next_ping = 0;
-        bool asks = false;  ///< Is in asking_.
+        TimeNs frames_heard = 0;  ///< CREDIT, TILE or NACK; or HELLO.
+        std::uint64_t told_progress = 0;
+        Epoch ready_for{};          ///< Of the last READY that was right.
+        std::uint32_t at_once = 1;  ///< Leases that it works on side by side.
+        bool asks = false;          ///< Is in asking_.
         bool same_bits = true;
         bool unreachable = false;  ///< When its connection was probed last.
 
@@ -180,10 +200,12 @@ class ClientMachine {
     // client_machine.cpp: messages.
     void count_dropped(ServerId server, std::string_view sentence, Channel channel);
     void reject_undecodable(const std::string& instance, const DecodeError& error, Channel channel);
-    void ask_who(const std::string& instance);
+    bool may_answer(const std::string& stranger);
+    bool ask_who(const std::string& instance);  ///< Whether it was time to.
     /// False if the peer is not connected.
     bool send(Channel channel, const std::string& instance, Message message, ServerId peer = k_local_server);
     void record(EventBody body);
+    [[nodiscard]] RenderSettings own_frame() const;
     void enforce_time_limit();
     void begin_epoch(const PackMap& changes, bool same_frame);
     template <class Other>
@@ -195,9 +217,6 @@ class ClientMachine {
     void reject_banned(const std::string& instance, const Ban& ban);
 
     // client_joining.cpp: from HELLO to READY, and the way out.
-    [[nodiscard]] std::optional<message::Reject> reason_to_reject(
-        const std::string& instance, const message::Hello& hello,
-        const std::optional<BitsMisfit>& misfit) const;
     void on_hello(const std::string& instance, const message::Hello& hello, const Sender& sender);
     void on(Server& server, message::SnapshotRequest& message);
     void on(Server& server, message::ManifestRequest& message);
@@ -215,6 +234,7 @@ class ClientMachine {
     void watch_progress(Server& server);
     bool ping(Server& server);
     void probe_connections();
+    void watch_frames(const Server& server);
     void watch_heartbeats();
 
     // client_work.cpp: leases out, light in.
@@ -228,10 +248,11 @@ class ClientMachine {
     void hand_out();
     void hand_out_to_servers();
     bool hand_out_to(Server& server);
-    [[nodiscard]] double samples_of_full_round() const;
     [[nodiscard]] std::uint64_t most_result_bytes() const;
     [[nodiscard]] std::size_t window_of(const Server& server) const;
+    [[nodiscard]] std::uint32_t rounds_per_lease_of(const Server& server) const;
     bool grant_to(Server& server);
+    std::optional<Lease> grant_straggler(Server& server);
     void send_lease(Server& server, const Lease& lease);
     [[nodiscard]] std::optional<LocalWork> next_local_work();
     void hand_out_locally();
@@ -244,9 +265,10 @@ class ClientMachine {
     std::size_t revoke(ServerId server);  ///< How many rounds were reopened.
 
     // client_audit.cpp: a second opinion.
-    void note_merged(LightPart part, const ResultClaim& claim, const RoundResult& result,
-                     std::span<const PixelSum> sums);
+    void note_merged(LightPart part, const ResultClaim& claim, std::uint32_t rounds,
+                     const RoundResult& result, std::span<const PixelSum> sums);
     [[nodiscard]] std::optional<AuditedRound> next_audit(const Server& server) const;
+    [[nodiscard]] std::uint32_t rounds_of(std::uint32_t unit, SampleRange samples) const;
     Lease grant_audit(const AuditedRound& item, ServerId server, TimeNs duration);
     [[nodiscard]] std::optional<AuditedRound> next_local_audit(bool disputes_only) const;
     void on_opinion(const ResultClaim& claim, std::span<const PixelSum> sums);
@@ -258,6 +280,7 @@ class ClientMachine {
     std::uint64_t take_back(const std::vector<Contribution>& gave, bool indirect);
 
     ClientConfig config_;
+    Strategy strategy_;
     ClientJob job_;
     EventStore& store_;
     ClientWorld& world_;
@@ -276,14 +299,15 @@ class ClientMachine {
     std::uint32_t last_server_ = 0;
     TimeNs next_look_ = 0;  ///< When all servers are looked at again.
     std::vector<Server*>
-        asking_;             ///< Those that spoke since work was handed out: they may have room for more.
-    bool serve_all_ = true;  ///< Others may get something as well.
+        asking_;                ///< Those that spoke since work was handed out: they may have room for more.
+    bool serve_all_ = true;     ///< Others may get something as well.
+    std::uint64_t places_ = 0;  ///< Leases that the servers work on, and one more for each to go on with.
     std::uint64_t rounds_open_ = 0;  ///< When work was handed out last.
     bool tell_schedule_ = true;      ///< Who may be given work has changed.
     bool reached_min_servers_ = false;
     bool announced_alone_ = false;
-    std::map<std::string, TimeNs> who_asked_;  ///< Unknown peers, bounded.
-    int probes_left_ = 0;                      ///< Of connections, after one was lost.
+    std::map<std::string, TimeNs> answered_;  ///< Unknown peers, bounded.
+    int probes_left_ = 0;                     ///< Of connections, after one was lost.
     TimeNs next_probe_ = 0;
 
     Conduct conduct_;
@@ -292,6 +316,9 @@ class ClientMachine {
     std::map<ServerId, Author> authors_;         ///< Those that live, or gave something in this epoch.
     LeaseId last_undone_{};                      ///< Rounds of leases up to it may have been undone.
     FrameWork work_;
+    IndirectWork& indirect_;  ///< What servers are given: work_, or what is relayed.
+    bool relays_;
+    std::uint64_t work_seen_ = 0;
     std::vector<PixelSum> arrived_;  ///< Of the tile at hand: its memory serves for all.
     std::uint64_t last_ticket_ = 0;
     std::map<std::uint64_t, LocalWork> local_work_;  ///< In the client's renderer, by ticket.

@@ -15,11 +15,9 @@
 #include <vector>
 
 #include "pathscope/net/context.hpp"
-#include "pathscope/net/publisher.hpp"
-#include "pathscope/net/router.hpp"
 #include "pathscope/session/child_process.hpp"
 #include "pathscope/session/client_machine.hpp"
-#include "pathscope/session/door.hpp"
+#include "pathscope/session/client_sockets.hpp"
 
 namespace pathscope {
 
@@ -55,11 +53,6 @@ class ClientSession : private ClientWorld {
     }  ///< Empty without sockets.
 
   private:
-    struct Sockets {
-        PublisherSocket input;
-        RouterSocket monitor;
-        RouterSocket frames;
-    };
     struct LocalServer {
         ChildProcess process;
         std::string name;
@@ -69,8 +62,6 @@ class ClientSession : private ClientWorld {
     ClientSession(const ClientConfig& config, ClientJob job, EventStore& store, WakePair wake);
     Result<void> open_sockets();
     Result<void> start_local_servers();
-    void receive(RouterSocket& socket, Channel channel);
-    void watch_door();
     void watch_local_servers();
 
     // The world, as the machine sees it.
@@ -83,8 +74,7 @@ class ClientSession : private ClientWorld {
     EventStore& store_;
     Context context_;
     WakePair wake_;
-    std::optional<Door> door_;
-    std::optional<Sockets> sockets_;
+    std::optional<ClientSockets> sockets_;
     std::array<std::string, 3> endpoints_;
     std::vector<LocalServer> local_servers_;
     RoundRunner runner_;

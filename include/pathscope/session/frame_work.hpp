@@ -25,6 +25,7 @@
 #include "pathscope/render/frame_sums.hpp"
 #include "pathscope/render/render_settings.hpp"
 #include "pathscope/session/frame_snapshot.hpp"
+#include "pathscope/session/indirect_work.hpp"
 
 namespace pathscope {
 
@@ -37,7 +38,7 @@ struct WorkPlan {
     bool can_undo = false;  ///< Keeps what restore() brought, for undo() and begin_anew().
 };
 
-class FrameWork {
+class FrameWork final : public IndirectWork {
   public:
     FrameWork(const WorkPlan& plan, EventStore& store);
 
@@ -53,17 +54,46 @@ class FrameWork {
     /// With passes, what a unit holds has decided about others: only begin_anew() helps. Requires: plan().can_undo, no passes.
     std::size_t undo(std::uint32_t unit, TimeNs now);
 
-    /// Who may be given indirect rounds.
-    void set_servers(std::vector<ServerShare> servers) { schedule_.set_servers(std::move(servers)); }
-
-    /// The next round for this server, granted for `duration(round, attempts)`.
-    template <class Duration>
-    std::optional<Lease> grant_indirect(ServerId server, TimeNs now, Duration&& duration) {
-        const std::optional<RoundKey> key = schedule_.pick(indirect_.ledger, server);
-        if (!key) return std::nullopt;
-        return indirect_.ledger.grant(server, *key, now,
-                                      duration(round_of(*key), indirect_.ledger.attempts(*key)));
+    // -- Indirect rounds, of servers: indirect_work.hpp -----------------------------------------------------
+    void set_servers(std::vector<ServerShare> servers) override { schedule_.set_servers(std::move(servers)); }
+    /// A unit's first round goes alone, so that there is a picture soon.
+    std::optional<Lease> grant_indirect(ServerId server, TimeNs now, std::uint32_t most,
+                                        const LeaseTime& duration) override;
+    std::optional<Lease> copy_straggler(ServerId server, TimeNs now, const OwnTime& own,
+                                        const LeaseTime& duration) override;
+    [[nodiscard]] Verdict judge(const ResultClaim& claim) const override {
+        return indirect_.ledger.judge(claim);
     }
+    Commit commit_indirect(const ResultClaim& claim, const RoundResult&, std::span<const PixelSum> sums,
+                           TimeNs, TimeNs now) override {
+        return commit(LightPart::indirect, claim, sums, now);
+    }
+    void release(LeaseId lease, ServerId server, TimeNs now) override {
+        indirect_.ledger.release(lease, server, now);
+    }
+    std::size_t revoke(ServerId server, TimeNs now) override {
+        return indirect_.ledger.revoke(server, now).size();
+    }
+    void expire(TimeNs now) override { indirect_.ledger.expire(now); }
+    [[nodiscard]] std::optional<TimeNs> next_deadline() const override {
+        return indirect_.ledger.next_deadline();
+    }
+    [[nodiscard]] PixelRect rect_of(const ResultClaim& claim) const override { return rect_of(claim.unit); }
+    [[nodiscard]] double samples_of_full_round() const override {
+        return double(plan_.block_size) * plan_.block_size * plan_.round_samples;
+    }
+    [[nodiscard]] std::size_t outstanding() const override { return indirect_.ledger.outstanding(); }
+    [[nodiscard]] std::size_t outstanding(ServerId server) const override {
+        return indirect_.ledger.outstanding(server);
+    }
+    [[nodiscard]] std::uint64_t rounds_open() const override { return indirect_.ledger.rounds_open(); }
+    [[nodiscard]] std::uint64_t rounds_waiting() const override { return indirect_.ledger.rounds_waiting(); }
+    [[nodiscard]] bool any_reopened() const override { return !indirect_.ledger.reopened().empty(); }
+    [[nodiscard]] std::uint64_t rounds_committed() const override {
+        return indirect_.ledger.rounds_committed();
+    }
+
+    // -- Direct rounds, of the client itself ----------------------------------------------------------------
     std::optional<Lease> grant_direct(TimeNs now);
     /// The direct part of the same round, if it is still open: both together cost less than one after the other.
     std::optional<Lease> grant_direct_beside(const Lease& indirect, TimeNs now);
@@ -71,7 +101,7 @@ class FrameWork {
         direct_.ledger.release(lease.id, lease.server, now);
     }
 
-    [[nodiscard]] Round round_of(const Lease& lease) const {
+    [[nodiscard]] Round round_of(const Lease& lease) const override {
         return round_of(lease.unit, {lease.first, lease.count});
     }
     [[nodiscard]] Round round_of(std::uint32_t unit, SampleRange samples) const {
@@ -134,7 +164,7 @@ class FrameWork {
     };
 
     [[nodiscard]] std::uint32_t block_of(std::uint32_t unit) const { return unit % grid_.count(); }
-    [[nodiscard]] Round round_of(RoundKey key) const;
+    [[nodiscard]] Round round_of(const RoundRun& run) const;
     [[nodiscard]] bool staged() const { return plan_.sampling.staged(); }
     [[nodiscard]] bool stopped() const { return direct_.ledger.stopped(); }
     [[nodiscard]] PassGoal goal_of(const Part& part) const;

@@ -14,6 +14,7 @@
 #include "pathscope/core/hash.hpp"
 #include "pathscope/protocol/message.hpp"
 #include "pathscope/scene/file_source.hpp"
+#include "pathscope/session/scene_cache.hpp"
 
 namespace pathscope {
 
@@ -21,6 +22,8 @@ class SceneDepot {
   public:
     SceneDepot() : SceneDepot(Manifest{}, {}) {}
     explicit SceneDepot(const DiskFiles& files);
+    /// Of files that lie in a cache.
+    SceneDepot(const Manifest& manifest, const SceneCache& cache);
 
     /// The render state names the files by this.
     [[nodiscard]] const Digest& manifest_hash() const { return manifest_hash_; }

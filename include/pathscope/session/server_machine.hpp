@@ -62,6 +62,13 @@ class ServerWorld {
     /// A number that rises while rounds are worked on, within a round as well: heartbeats carry it.
     [[nodiscard]] virtual std::uint64_t work_done() const = 0;
 
+    /// Of the rounds that were begun: how many are worked on side by side, and whether this one is. The first always is.
+    [[nodiscard]] virtual std::uint32_t leases_at_once() const { return 1; }
+    [[nodiscard]] virtual bool works_on(std::uint64_t /*ticket*/) const { return false; }
+
+    /// From here on rounds are of this state.
+    virtual void on_state(const RenderState& /*state*/) {}
+
     /// Begins to load a scene whose files are in the cache; it comes back by on_loaded(). One at a time.
     virtual void load(RenderState state, Manifest manifest) = 0;
     /// Whether load() reads files. If not, none are fetched, and its manifest is empty.
@@ -96,9 +103,12 @@ class ServerMachine {
     [[nodiscard]] bool drained() const { return leases_.empty() && unsent_answers_.empty(); }
     /// The last word. Nothing may be sent after it.
     void say_goodbye(TimeNs now);
+    /// Goodbye, but not for ever: ends the link, and may be linked again. Requires: linked().
+    void leave(std::string why, TimeNs now);
 
     // -- View -----------------------------------------------------------------------------------------------
 
+    [[nodiscard]] TimeNs now() const { return now_; }  ///< Of what happened last.
     [[nodiscard]] bool linked() const { return linked_; }
     [[nodiscard]] bool welcomed() const { return linked_ && phase_ != Phase::hello; }
     /// The client said stop, or refused this server for good: refusal() tells why.
@@ -181,7 +191,7 @@ class ServerMachine {
     // Timers.
     TimeNs last_heard_ = 0;
     TimeNs next_hello_ = 0;
-    TimeNs banned_until_ = 0;  ///< The client said so; it hears nothing before.
+    TimeNs hello_not_before_ = 0;  ///< The client said so; it hears nothing before.
     TimeNs hello_pause_ = 0;
     TimeNs next_ping_ = 0;
     std::optional<TimeNs> missed_since_;  ///< A PING told of an INPUT that has not come.

@@ -16,11 +16,9 @@
 #include <string>
 
 #include "pathscope/net/context.hpp"
-#include "pathscope/net/dealer.hpp"
-#include "pathscope/net/subscriber.hpp"
 #include "pathscope/net/wake_pair.hpp"
 #include "pathscope/session/client_config.hpp"
-#include "pathscope/session/refusal.hpp"
+#include "pathscope/session/server_link.hpp"
 #include "pathscope/session/server_machine.hpp"
 #include "pathscope/session/worker.hpp"
 
@@ -40,6 +38,9 @@ struct ServerConfig {
     std::optional<MeshCache> mesh_cache;
 };
 
+/// Of a server that was given no name: host name and process id.
+[[nodiscard]] std::string default_server_name();
+
 class ServerSession : private ServerWorld {
   public:
     [[nodiscard]] static Result<std::unique_ptr<ServerSession>> create(ServerConfig config);
@@ -53,20 +54,9 @@ class ServerSession : private ServerWorld {
     void request_stop() noexcept;
 
   private:
-    struct Link {
-        SubscriberSocket input;
-        DealerSocket monitor;
-        ConnectionWatch watch;  ///< Of monitor; the others share its fate.
-        DealerSocket frames;
-    };
-
     explicit ServerSession(ServerConfig config, WakePair wake);
     void wait_to_dial();
-    Result<void> dial();
-    void on_connection_changes();
     void step();
-    template <class Socket>
-    void receive(Socket& socket, Channel channel);
     void say_goodbye();
 
     // The world, as the machine sees it.
@@ -81,8 +71,7 @@ class ServerSession : private ServerWorld {
     Context context_;
     WakePair wake_;
     std::atomic<bool> stop_requested_{false};
-    Redial redial_;
-    std::optional<Link> link_;
+    ServerLink link_;
     SceneCache cache_;
     ServerMachine machine_;
     Mailbox<LoadedScene> loaded_;

@@ -1,8 +1,8 @@
 #pragma once
 /// `--stats`: what a run did, as JSON, made from the event store and the finished frame.
 ///
-/// Keys are a contract (docs/programs.md): scripts read them. rounds == rounds_committed says that every round of indirect light was
-/// counted exactly once.
+/// Keys are a contract (docs/programs.md): scripts read them. rounds == rounds_committed says that every round of indirect
+/// light was counted exactly once.
 /// Units: seconds for *_s, milliseconds for *_ms, bytes. Thread safety: pure.   Test: tests/session/test_stats.cpp
 
 #include <cstdint>

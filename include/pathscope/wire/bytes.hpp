@@ -35,22 +35,29 @@ class ByteWriter {
   public:
     template <WireNumber T>
     void little(T value) {
-        const auto bits = std::bit_cast<detail::UnsignedOfSize<sizeof(T)>>(value);
-        for (std::size_t i = 0; i < sizeof(T); ++i) bytes_.push_back(static_cast<char>(bits >> (8 * i)));
+        number(value, [](std::size_t i) { return 8 * i; });
     }
 
     template <WireNumber T>
     void big(T value) {
-        const auto bits = std::bit_cast<detail::UnsignedOfSize<sizeof(T)>>(value);
-        for (std::size_t i = sizeof(T); i-- > 0;) bytes_.push_back(static_cast<char>(bits >> (8 * i)));
+        number(value, [](std::size_t i) { return 8 * (sizeof(T) - 1 - i); });
     }
 
     void raw(std::string_view bytes) { bytes_.append(bytes); }
+    void reserve(std::size_t bytes) { bytes_.reserve(bytes); }  ///< Room for so many in all.
 
     [[nodiscard]] const std::string& bytes() const { return bytes_; }
     [[nodiscard]] std::string take() { return std::move(bytes_); }
 
   private:
+    template <class T, class ShiftOfByte>
+    void number(T value, ShiftOfByte shift_of_byte) {
+        const auto bits = std::bit_cast<detail::UnsignedOfSize<sizeof(T)>>(value);
+        char bytes[sizeof(T)];
+        for (std::size_t i = 0; i < sizeof(T); ++i) bytes[i] = static_cast<char>(bits >> shift_of_byte(i));
+        bytes_.append(bytes, sizeof bytes);
+    }
+
     std::string bytes_;
 };
 

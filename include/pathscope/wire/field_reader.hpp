@@ -9,6 +9,7 @@
 /// The first thing that is wrong is kept; from then on fields return their least value. So a decoder is a
 /// list of fields, and cannot forget a check. The sentence names the context and the field. Unknown keys are
 /// no error, unless only() is asked for.
+/// Cost: nothing is searched for when fields are read in the order in which they were written.
 /// Convention: sizes of texts and bytes are in bytes. Requires: the map outlives the reader.
 /// Thread safety: one thread.   Test: tests/wire/test_field_reader.cpp
 
@@ -40,17 +41,19 @@ class FieldReader {
     double f64(std::string_view name, double least = std::numeric_limits<double>::lowest(),
                double most = std::numeric_limits<double>::max());
     bool boolean(std::string_view name);
-    std::string text(std::string_view name, std::size_t min_bytes, std::size_t max_bytes);  ///< Printable.
-    std::string bytes(std::string_view name, std::size_t min_bytes, std::size_t max_bytes);
+    // As long as the map lives.
+    std::string_view text(std::string_view name, std::size_t min_bytes,
+                          std::size_t max_bytes);  ///< Printable.
+    std::string_view bytes(std::string_view name, std::size_t min_bytes, std::size_t max_bytes);
     const PackArray& array(std::string_view name, std::size_t max_items);
     const PackMap& map(std::string_view name);
 
     template <class E>
     E enumerator(std::string_view name) {
-        const std::string word = text(name, 0, 256);
+        const std::string_view word = text(name, 0, 256);
         if (error_) return E{};
         if (const auto value = from_name<E>(word)) return *value;
-        fail(name, "is '" + word + "', which is none of " + joined_names<E>(", "));
+        fail(name, "is '" + std::string(word) + "', which is none of " + joined_names<E>(", "));
         return E{};
     }
 
@@ -67,9 +70,12 @@ class FieldReader {
   private:
     const PackValue* find(std::string_view name);
     template <class Kind>
+    const Kind* as(std::string_view name, const PackValue& value, std::string_view expected);
+    template <class Kind>
     const Kind* find_kind(std::string_view name, std::string_view expected);
 
     const PackMap* map_;
+    std::size_t next_ = 0;  ///< The entry after the one that was found last.
     std::string context_;
     std::optional<Error> error_;
 };

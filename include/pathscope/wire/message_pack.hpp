@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "pathscope/core/result.hpp"
+#include "pathscope/wire/bytes.hpp"
 
 namespace pathscope {
 
@@ -120,6 +121,40 @@ inline constexpr PackLimits k_payload_limits{8 << 20, 8, 1 << 20};
 
 /// Requires: text is UTF-8, texts and bytes are shorter than 2^32.
 [[nodiscard]] std::string pack(const PackValue& value);
+
+/// The same bytes without a PackValue, for what is said ten thousand times a second:
+///
+///     PackWriter out;                      // {"epoch": 3}
+///     out.map(1);
+///     out.text("epoch");
+///     out.integer(std::uint64_t{3});
+///
+/// Requires: after array(n), n values follow; after map(n), n times a text that is the key, and a value; no key twice.
+class PackWriter {
+  public:
+    void nil();
+    void boolean(bool value);
+    void integer(std::uint64_t value);
+    void integer(std::int64_t value);
+    void real(double value);
+    void text(std::string_view text);
+    void bytes(std::string_view bytes);
+    void array(std::size_t items);
+    void map(std::size_t entries);
+    void append(const PackWriter& more) { out_.raw(more.out_.bytes()); }
+
+    void reserve(std::size_t bytes) { out_.reserve(bytes); }
+    [[nodiscard]] std::size_t size() const { return out_.bytes().size(); }
+    [[nodiscard]] std::string take() { return out_.take(); }
+
+  private:
+    template <class T>
+    void prefixed(std::uint8_t first, T number);
+    void length(std::size_t size, std::optional<std::uint8_t> form8, std::uint8_t form16,
+                std::uint8_t form32);
+
+    ByteWriter out_;
+};
 
 /// Exactly one value and nothing after it. The sentence says what is wrong, and at which byte.
 [[nodiscard]] Result<PackValue> unpack(std::string_view bytes, const PackLimits& limits = k_header_limits);
