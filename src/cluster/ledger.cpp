@@ -28,6 +28,17 @@ UnitReason reason_of(Verdict refusal) {
 
 }  // namespace
 
+Counter refusal_counter(Verdict refusal) {
+    switch (refusal) {
+        case Verdict::duplicate:
+            return Counter::duplicates_dropped;
+        case Verdict::stale_epoch:
+            return Counter::stale_dropped;
+        default:
+            return Counter::refused_results;
+    }
+}
+
 SampleRange samples_of(const LedgerPlan& plan, const RoundRun& run) {
     const auto [unit, index] = run.first;
     const std::uint32_t in_all = plan.rounds_of(unit);
@@ -234,7 +245,7 @@ void Ledger::forget_one_ended(const Active& active) {
     forget(*victim);
 }
 
-/// Its result would be unknown from here on, or a duplicate.
+/// Its result would be `forgotten` from here on, or a duplicate.
 void Ledger::forget(LeaseId lease) {
     const auto found = records_.find(lease);
     const RoundRun run = rounds_of(found->second.lease);
@@ -259,7 +270,7 @@ Verdict Ledger::judge(const ResultClaim& claim) const {
     const std::uint32_t fresh = units_[claim.unit].fresh;  // From there on none is committed.
     for (std::uint32_t i = 0; i < run->rounds && run->at(i).index < fresh; ++i)
         if (committed(run->at(i))) return Verdict::duplicate;
-    return Verdict::unknown;
+    return Verdict::forgotten;
 }
 
 Commit Ledger::commit(const ResultClaim& claim, TimeNs now) {
@@ -334,24 +345,24 @@ void Ledger::supersede(LeaseId id, const RoundRun& by, Commit& commit, TimeNs no
 }
 
 void Ledger::refuse(Verdict verdict, const ResultClaim& claim, TimeNs now) {
-    Counter counter = Counter::refused_results;
     switch (verdict) {
         case Verdict::duplicate:
             ++counts_.duplicates;
-            counter = Counter::duplicates_dropped;
             break;
         case Verdict::stale_epoch:
             ++counts_.stale;
-            counter = Counter::stale_dropped;
             break;
         case Verdict::mismatched:
             ++counts_.mismatched;
+            break;
+        case Verdict::forgotten:
+            ++counts_.forgotten;
             break;
         default:
             ++counts_.unknown;
             break;
     }
-    count(counter, 1, claim.server);
+    count(refusal_counter(verdict), 1, claim.server);
     const Lease named{claim.lease,  claim.epoch, claim.unit, claim.first, claim.count,
                       claim.server, now,         now,        false};
     note(named, UnitChange::refused, reason_of(verdict), now);
@@ -499,114 +510,6 @@ std::optional<TimeNs> Ledger::next_deadline() const {
 }
 
 std::uint64_t Ledger::rounds() const { return plan_.open_ended() ? begun_ : open_; }
-
-// -- Audit --------------------------------------------------------------------------------------------------
-
-Result<void> Ledger::audit() const {
-    for (const auto check : {&Ledger::audit_balances, &Ledger::audit_records, &Ledger::audit_units})
-        if (Result<void> found = (this->*check)(); !found) return found;
-    return {};
-}
-
-Result<void> Ledger::audit_balances() const {
-    const LedgerCounts& c = counts_;
-    const std::uint64_t ended = c.returned + c.superseded + c.released + c.expired + c.revoked + c.dropped;
-    if (c.granted != outstanding_ + ended)
-        return failed(fmt::format("Ledger: {} leases were granted, but {} are outstanding and {} ended.",
-                                  c.granted, outstanding_, ended));
-    const std::uint64_t judged = c.accepted + c.duplicates + c.stale + c.unknown + c.mismatched;
-    if (c.received != judged)
-        return failed(fmt::format("Ledger: {} results came, but {} were judged.", c.received, judged));
-    if (c.accepted != c.returned + c.late)
-        return failed(fmt::format("Ledger: {} results were accepted, but {} came in time and {} late.",
-                                  c.accepted, c.returned, c.late));
-    const std::uint64_t booked =
-        c.rounds_accepted - accepted_before_ + restored_ - (c.undone - undone_before_);
-    if (committed_ != booked)
-        return failed(
-            fmt::format("Ledger: {} rounds are committed, but those of results are {}.", committed_, booked));
-    return {};
-}
-
-Result<void> Ledger::audit_records() const {
-    std::size_t known = 0, holders = 0, open = 0, alone = 0;
-    for (const auto& [round, active] : active_) {
-        std::size_t outstanding = 0;
-        std::optional<RoundRun> held;
-        for (const LeaseId id : active.leases) {
-            const auto record = records_.find(id);
-            if (record == records_.end() || !rounds_of(record->second.lease).contains(round))
-                return failed(
-                    fmt::format("Ledger: lease {} of unit {} has no record.", id.value, round.unit));
-            if (!record->second.outstanding) continue;
-            ++outstanding;
-            const RoundRun run = rounds_of(record->second.lease);
-            if (held && (held->first != run.first || held->rounds != run.rounds))
-                return failed(
-                    fmt::format("Ledger: outstanding leases of unit {} overlap in part.", round.unit));
-            held = run;
-            if (uncopied_.contains(id) != (active.holders == 1))
-                return failed(fmt::format("Ledger: lease {} of {} holders is {}copied.", id.value,
-                                          active.holders, uncopied_.contains(id) ? "un" : ""));
-            alone += active.holders == 1 && run.first == round ? 1 : 0;
-        }
-        if (outstanding != active.holders || active.holders > k_holders_per_round ||
-            active.leases.size() > k_leases_per_round)
-            return failed(
-                fmt::format("Ledger: round {} of unit {} has {} leases, {} outstanding, {} counted.",
-                            round.index, round.unit, active.leases.size(), outstanding, active.holders));
-        const auto waiting = std::count(reopened_.begin(), reopened_.end(), round);
-        if (waiting != (active.holders == 0 ? 1 : 0))
-            return failed(fmt::format("Ledger: round {} of unit {} waits {} times, with {} holders.",
-                                      round.index, round.unit, waiting, active.holders));
-        known += active.leases.size();
-        holders += active.holders;
-        open += active.holders == 0 ? 1 : 0;
-    }
-    if (uncopied_.size() != alone)
-        return failed(
-            fmt::format("Ledger: {} leases have one holder, {} are uncopied.", alone, uncopied_.size()));
-    std::size_t held = 0, rounds_recorded = 0, rounds_outstanding = 0;
-    for (const auto& [server, leases] : held_) held += leases;
-    for (const auto& [id, record] : records_) {
-        const std::size_t rounds = rounds_of(record.lease).rounds;
-        rounds_recorded += rounds;
-        rounds_outstanding += record.outstanding ? rounds : 0;
-    }
-    if (known != rounds_recorded || open != reopened_.size() || holders != rounds_outstanding ||
-        held != outstanding_ || deadlines_.size() != outstanding_)
-        return failed(
-            fmt::format("Ledger: records of {} rounds, {} listed by them; {} waiting of {}; {} rounds "
-                        "outstanding, {} held; "
-                        "{} leases outstanding, {} held by servers, {} deadlines.",
-                        rounds_recorded, known, reopened_.size(), open, rounds_outstanding, holders,
-                        outstanding_, held, deadlines_.size()));
-    return {};
-}
-
-Result<void> Ledger::audit_units() const {
-    std::uint64_t committed = 0, open = 0;
-    for (std::uint32_t unit = 0; unit < plan_.units; ++unit) {
-        const UnitSnapshot account = snapshot(unit);
-        open += units_[unit].open;
-        if (account.reached > units_[unit].open)
-            return failed(fmt::format("Ledger: {} rounds of unit {} were granted, but {} are open.",
-                                      account.reached, unit, units_[unit].open));
-        std::uint32_t samples = samples_before(unit, account.reached);
-        for (const std::uint32_t index : account.missing)
-            samples -= samples_of_round(plan_, {unit, index}).count;
-        if (samples != units_[unit].samples)
-            return failed(fmt::format("Ledger: unit {} has {} samples in its rounds, {} in its account.",
-                                      unit, samples, units_[unit].samples));
-        committed += account.reached - account.missing.size();
-    }
-    if (open != open_)
-        return failed(fmt::format("Ledger: the units have {} open rounds, the account {}.", open, open_));
-    if (committed != committed_)
-        return failed(fmt::format("Ledger: the units hold {} committed rounds, the account {}.", committed,
-                                  committed_));
-    return {};
-}
 
 void Ledger::note(const Lease& lease, UnitChange change, UnitReason reason, TimeNs now,
                   ServerId previous) const {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "pathscope/core/log.hpp"
@@ -10,10 +11,11 @@
 namespace pathscope {
 namespace {
 
-/// The end of a connection is told a moment before, or after, the socket itself knows: most often a short one, and on a busy
-/// machine a longer one. So pauses double: 1, 2, 4, ... 32 ms.
-constexpr int k_probes = 7;
-constexpr TimeNs k_first_probe_pause = k_millisecond_ns;
+/// The end of a connection is told a moment before, or after, the socket itself knows: most often a few milliseconds, and on
+/// a busy machine longer. In milliseconds.
+constexpr std::array k_probe_pauses{1, 1, 1, 1, 1, 2, 4, 8, 16, 32};
+constexpr int k_probes = int(k_probe_pauses.size());
+constexpr TimeNs k_confirming_pause = k_millisecond_ns;
 
 /// Looking at a thousand servers takes a fraction of a millisecond: not after every message.
 constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
@@ -53,10 +55,10 @@ void ClientMachine::watch_progress(Server& server) {
         const std::string why = fmt::format("It answers, but its work has stood still for {:.1f} s.",
                                             to_seconds(server.progress.still()));
         step_peer(server, PeerCause::stuck, why);
-        const std::size_t open = revoke(id);
+        const std::size_t ended = revoke(id);
         store_.count(Counter::stuck, 1, id);
-        log_note(fmt::format("{} is stuck: {} {} round{} of it go{} to others.", server.name, why, open,
-                             open == 1 ? "" : "s", open == 1 ? "es" : ""));
+        log_note(fmt::format("{} is stuck: {} {} lease{} of it go{} to others.", server.name, why, ended,
+                             ended == 1 ? "" : "s", ended == 1 ? "es" : ""));
         servers_changed();
     } else if (!stuck && state == PeerState::stuck) {
         step_peer(server, PeerCause::moved, "Its work goes on.");
@@ -83,8 +85,8 @@ void ClientMachine::on_connection_lost(TimeNs now) {
 /// Who cannot be reached twice has no connection any more. Why twice: a server that leaves says so and hangs up, and what it
 /// said is read between the two.
 void ClientMachine::probe_connections() {
+    next_probe_ = now_ + k_probe_pauses[std::size_t(k_probes - probes_left_)] * k_millisecond_ns;
     --probes_left_;
-    next_probe_ = now_ + (k_first_probe_pause << (k_probes - 1 - probes_left_));
     std::vector<std::string> unreachable;
     for (auto& [instance, server] : servers_) {
         const bool was_unreachable = std::exchange(server.unreachable, !ping(server));
@@ -93,7 +95,7 @@ void ClientMachine::probe_connections() {
             unreachable.push_back(instance);
         } else {
             probes_left_ = std::max(probes_left_, 1);
-            next_probe_ = now_ + k_first_probe_pause;
+            next_probe_ = now_ + k_confirming_pause;
         }
     }
     for (const std::string& instance : unreachable)

@@ -34,6 +34,7 @@ void RelayWork::begin(RoundJob job, TimeNs now) {
     usual_samples_ = double(samples) * double(round.rect.area());
     usual_rounds_ = std::uint32_t(work.ledger.rounds_open());
     rounds_open_ += work.ledger.rounds_open();
+    most_pixels_ = std::max(most_pixels_, std::uint64_t(round.rect.area()));
     jobs_.emplace(work.asked.ticket, std::move(work));
 }
 
@@ -46,11 +47,11 @@ std::vector<Lease> RelayWork::finish(Jobs::iterator entry, bool complete) {
     outcome.ticket = job.asked.ticket;
     outcome.part = job.asked.part;
     outcome.round = job.asked.round;
-    outcome.started = job.begun;
+    outcome.started = job.begun.value_or(0);
     outcome.duration = job.worked / TimeNs(std::max<std::size_t>(1, servers_));
     if (complete) outcome.result = std::move(job.result);
     finished_.push_back(std::move(outcome));
-    for (const LeaseId number : job.numbers) known_.erase(number);
+    for (const auto& [lease, number] : job.numbers) known_.erase(number);
     jobs_.erase(entry);
     return unneeded;
 }
@@ -76,7 +77,7 @@ void RelayWork::begin_epoch(Epoch epoch, TimeNs now) {
 // ---- Below: leases.
 
 Lease RelayWork::as_known_below(const Job& job, Lease lease) const {
-    lease.id = job.numbers.at(lease.id.value - 1);
+    lease.id = job.numbers.at(lease.id);
     lease.epoch = epoch_;
     lease.unit = job.asked.round.block;
     lease.first += job.asked.round.first;
@@ -85,9 +86,8 @@ Lease RelayWork::as_known_below(const Job& job, Lease lease) const {
 
 Lease RelayWork::note_grant(Job& job, const Lease& lease) {
     const LeaseId number{++last_lease_};
-    CHECK(lease.id.value == job.numbers.size() + 1, lease.id, job.numbers.size());
-    if (job.numbers.empty()) job.begun = lease.granted;
-    job.numbers.push_back(number);
+    if (!job.begun) job.begun = lease.granted;
+    job.numbers.emplace(lease.id, number);
     known_.emplace(number, Known{job.asked.ticket, lease.id});
     return as_known_below(job, lease);
 }
@@ -126,8 +126,13 @@ std::optional<Lease> RelayWork::copy_straggler(ServerId server, TimeNs now, cons
 }
 
 void RelayWork::release(LeaseId lease, ServerId server, TimeNs now) {
-    if (const auto known = known_.find(lease); known != known_.end())
-        jobs_.at(known->second.ticket).ledger.release(known->second.lease, server, now);
+    const auto known = known_.find(lease);
+    if (known == known_.end()) return;
+    Job& job = jobs_.at(known->second.ticket);
+    if (!job.ledger.release(known->second.lease, server, now)) return;
+    // No result will come: its number need not be known any more. Whoever gives back leases for ever fills no memory.
+    job.numbers.erase(known->second.lease);
+    known_.erase(known);
 }
 
 std::size_t RelayWork::revoke(ServerId server, TimeNs now) {
@@ -178,7 +183,7 @@ Commit RelayWork::commit_indirect(const ResultClaim& claim, const RoundResult& r
     const auto booked =
         entry == jobs_.end() ? std::nullopt : as_booked(entry->second, known->second.lease, claim);
     if (!booked) {
-        if (store_) store_->count(Counter::refused_results, 1, claim.server);
+        if (store_) store_->count(refusal_counter(commit.verdict), 1, claim.server);
         return commit;
     }
     Job& job = entry->second;
@@ -243,17 +248,17 @@ bool RelayWork::any_reopened() const {
 
 bool RelayWork::has_begun(std::uint64_t ticket) const {
     const auto job = jobs_.find(ticket);
-    return job != jobs_.end() && !job->second.numbers.empty();
+    return job != jobs_.end() && job->second.begun;
 }
 
 std::uint32_t RelayWork::leases_for(std::size_t rounds) const {
     return std::uint32_t((rounds + usual_rounds_ - 1) / usual_rounds_);
 }
 
-Result<void> RelayWork::audit() const {
+Result<void> RelayWork::check_invariants() const {
     std::size_t numbers = 0;
     for (const auto& [ticket, job] : jobs_) {
-        if (const auto sound = job.ledger.audit(); !sound) return sound;
+        if (const auto sound = job.ledger.check_invariants(); !sound) return sound;
         const std::uint64_t booked =
             std::uint64_t(job.ledger.samples_committed(0)) * std::uint64_t(job.asked.round.rect.area());
         if (job.ledger.complete() || job.result.samples != booked)

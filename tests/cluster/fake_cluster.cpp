@@ -423,7 +423,7 @@ void FakeCluster::check_all() {
     check_progress();
     if (processes_.size() > 12 && totals_.events % 16 != 0) return;
     ++totals_.audits;
-    if (const auto audit = ledger_.audit(); !audit) fail(audit.error().message);
+    if (const auto sound = ledger_.check_invariants(); !sound) fail(sound.error().message);
     std::uint64_t merged = 0;
     for (const auto& [unit, firsts] : merged_) merged += firsts.size();
     if (merged != ledger_.rounds_committed())

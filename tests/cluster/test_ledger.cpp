@@ -35,9 +35,9 @@ Verdict verdict_of(Ledger& ledger, const ResultClaim& claim) {
     return committed;
 }
 
-void check_audit(const Ledger& ledger) {
-    const Result<void> audit = ledger.audit();
-    CHECK_MESSAGE(bool(audit), (audit ? "" : audit.error().message));
+void check_sound(const Ledger& ledger) {
+    const Result<void> sound = ledger.check_invariants();
+    CHECK_MESSAGE(bool(sound), (sound ? "" : sound.error().message));
 }
 
 std::vector<UnitReason> reasons_in(const EventStore& store) {
@@ -78,7 +78,7 @@ TEST_CASE("a staged plan grants what is open, group by group with samples of its
               RoundKey{i < 2 ? 1u : 3u, std::uint32_t(i < 2 ? i : i - 2)});
         CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::accepted);
         CHECK(verdict_of(ledger, claim_of(leases[i])) == Verdict::duplicate);
-        check_audit(ledger);
+        check_sound(ledger);
     }
     CHECK(ledger.complete());
     CHECK(ledger.samples_committed(1) == 6);
@@ -94,7 +94,7 @@ TEST_CASE("a staged plan grants what is open, group by group with samples of its
     CHECK(!ledger.complete());
     CHECK(ledger.next_fresh(3) == RoundKey{3, 3});
     CHECK(!ledger.next_fresh(1));
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("rounds cut a unit's samples without gap or overlap") {
@@ -123,7 +123,7 @@ TEST_CASE("each round is granted and committed once, then the account is complet
             const Lease lease = *ledger.grant(k_a, *round, 0, k_lease);
             CHECK(granted.emplace(lease.unit, lease.first).second);
             CHECK(verdict_of(ledger, claim_of(lease)) == Verdict::accepted);
-            check_audit(ledger);
+            check_sound(ledger);
         }
     CHECK(granted.size() == 9);
     CHECK(ledger.complete());
@@ -144,7 +144,7 @@ TEST_CASE("only open rounds are granted: not held ones, not committed ones, not 
     ledger.commit(claim_of(lease), 0);
     CHECK_FALSE(ledger.grant(k_b, {0, 0}, 0, k_lease).has_value());
     CHECK(ledger.counts().granted == 1);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a repeated result is a duplicate, though the lease's record is gone") {
@@ -155,7 +155,7 @@ TEST_CASE("a repeated result is a duplicate, though the lease's record is gone")
     CHECK(verdict_of(ledger, claim_of(lease)) == Verdict::duplicate);
     CHECK(ledger.samples_committed(0) == 1);
     CHECK(ledger.counts().duplicates == 2);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a result that is not what its lease says is refused, and the lease stays") {
@@ -175,17 +175,17 @@ TEST_CASE("a result that is not what its lease says is refused, and the lease st
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.lease.value = 99; })) == Verdict::unknown);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.epoch.value = 2; })) == Verdict::unknown);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.epoch.value = 0; })) == Verdict::stale_epoch);
-    check_audit(ledger);
+    check_sound(ledger);
     CHECK(ledger.outstanding() == 1);
     CHECK(verdict_of(ledger, good) == Verdict::accepted);
 
     // Without the record, the range must still be one of the plan's, and committed to be a duplicate.
-    CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = 4; })) == Verdict::unknown);
+    CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = 4; })) == Verdict::forgotten);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = 2; })) == Verdict::mismatched);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.unit = 4; })) == Verdict::mismatched);
     CHECK(verdict_of(ledger, altered([](ResultClaim& c) { c.first = ~0u, c.count = ~0u; })) ==
           Verdict::mismatched);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("an expired lease reopens its round; its late result is welcome if it is the first") {
@@ -221,7 +221,7 @@ TEST_CASE("an expired lease reopens its round; its late result is welcome if it 
     }
     CHECK(ledger.samples_committed(0) == 1);
     CHECK(ledger.counts().expired == 1);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a dead server's rounds reopen before fresh ones, in the order of granting, and count when moved") {
@@ -244,7 +244,7 @@ TEST_CASE("a dead server's rounds reopen before fresh ones, in the order of gran
                                                        UnitReason::fresh, UnitReason::server_lost,
                                                        UnitReason::server_lost, UnitReason::reallocated,
                                                        UnitReason::retried});
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a lease given back reopens its round; only its holder can give it back") {
@@ -256,8 +256,8 @@ TEST_CASE("a lease given back reopens its round; only its holder can give it bac
     CHECK_FALSE(ledger.release(lease.id, k_a, 0).has_value());
     CHECK(ledger.reopened().size() == 1);
     // It said that no result would come; one that comes all the same is not believed.
-    CHECK(verdict_of(ledger, claim_of(lease)) == Verdict::unknown);
-    check_audit(ledger);
+    CHECK(verdict_of(ledger, claim_of(lease)) == Verdict::forgotten);
+    check_sound(ledger);
 }
 
 TEST_CASE("a straggler's round goes to one more server, and the first result counts") {
@@ -288,7 +288,7 @@ TEST_CASE("a straggler's round goes to one more server, and the first result cou
         ledger.revoke(k_a, 1);
         CHECK(ledger.reopened().size() == 1);
     }
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a new epoch drops everything of the old one") {
@@ -314,7 +314,7 @@ TEST_CASE("a new epoch drops everything of the old one") {
     CHECK(verdict_of(ledger, claim_of(fresh)) == Verdict::accepted);
     CHECK(ledger.counts().dropped == 1);
     CHECK(ledger.counts().stale == 1);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("open-ended work goes on until stop, then waits for what is out") {
@@ -335,7 +335,7 @@ TEST_CASE("open-ended work goes on until stop, then waits for what is out") {
     CHECK(ledger.complete());
     CHECK(ledger.samples_committed(0) == 99 * 8);
     CHECK(ledger.samples_committed(1) == 8);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a round that nobody finishes does not fill the memory, and its oldest holder is still welcome") {
@@ -344,10 +344,10 @@ TEST_CASE("a round that nobody finishes does not fill the memory, and its oldest
     for (std::uint32_t i = 0; i < 100; ++i) {
         leases.push_back(*ledger.grant(ServerId{1 + i}, {0, 0}, TimeNs(i), 1));
         CHECK(ledger.expire(TimeNs(i) + 1).size() == 1);
-        check_audit(ledger);  // bounds the records of a round
+        check_sound(ledger);  // bounds the records of a round
     }
     CHECK(ledger.attempts({0, 0}) == 100);
-    CHECK(verdict_of(ledger, claim_of(leases[50])) == Verdict::unknown);
+    CHECK(verdict_of(ledger, claim_of(leases[50])) == Verdict::forgotten);
     CHECK(verdict_of(ledger, claim_of(leases[0])) == Verdict::accepted);
     CHECK(verdict_of(ledger, claim_of(leases[50])) == Verdict::duplicate);
 }
@@ -366,7 +366,7 @@ TEST_CASE("a checkpoint restores what was committed, and nothing else") {
     EventStore store;
     Ledger after = ledger_of(plan, &store);
     for (std::uint32_t unit = 0; unit < 3; ++unit) REQUIRE(bool(after.restore(unit, before.snapshot(unit))));
-    check_audit(after);
+    check_sound(after);
     CHECK(after.rounds_committed() == 7);
     CHECK(store.total(Counter::rounds_committed) == 7);
     CHECK(after.reopened() == std::deque<RoundKey>{{0, 1}, {0, 3}});
@@ -381,7 +381,7 @@ TEST_CASE("a checkpoint restores what was committed, and nothing else") {
             after.commit(claim_of(*after.grant(k_c, *round, 0, k_lease)), 0);
     CHECK(after.complete());
     CHECK(after.counts().accepted == 8);
-    check_audit(after);
+    check_sound(after);
 }
 
 TEST_CASE("a checkpoint that does not fit the plan is refused") {
@@ -393,7 +393,7 @@ TEST_CASE("a checkpoint that does not fit the plan is refused") {
     CHECK_FALSE(bool(ledger.restore(0, {3, {2, 1}})));
     CHECK(bool(ledger.restore(0, {3, {1, 2}})));
     CHECK_FALSE(bool(ledger.restore(0, {3, {}})));
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("the store's counters are the ledger's") {
@@ -423,7 +423,7 @@ TEST_CASE("the store's counters are the ledger's") {
     for (const ServerId server : {k_a, k_b})
         CHECK(store.server(server)->total(Counter::rounds_committed) == 1);
     CHECK(store.server(k_c)->total(Counter::reallocated) == 1);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 // ---- Leases of several rounds.
@@ -445,7 +445,7 @@ TEST_CASE("one lease holds rounds that follow each other, and brings them togeth
     CHECK(ledger.rounds_of(two).rounds == 2);
     CHECK(ledger.rounds_waiting() == 3);
     CHECK(ledger.outstanding() == 2);
-    check_audit(ledger);
+    check_sound(ledger);
 
     for (auto [first, count] :
          {SampleRange{4, 4}, SampleRange{8, 2}, SampleRange{4, 5}, SampleRange{0, 10}}) {
@@ -462,10 +462,10 @@ TEST_CASE("one lease holds rounds that follow each other, and brings them togeth
     CHECK(ledger.samples_committed(0) == 6);
     CHECK(verdict_of(ledger, claim_of(two)) == Verdict::duplicate);
     CHECK(ledger.snapshot(0).missing == std::vector<std::uint32_t>{0});
-    check_audit(ledger);
+    check_sound(ledger);
     CHECK(verdict_of(ledger, claim_of(one)) == Verdict::accepted);
     CHECK(ledger.samples_committed(0) == 10);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("the rounds of a lease that ends are open again, and go on together or apart") {
@@ -474,21 +474,21 @@ TEST_CASE("the rounds of a lease that ends are open again, and go on together or
     const Lease rest = *ledger.grant(k_b, RoundRun({0, 3}, 3), 0, k_lease);
     CHECK(ledger.expire(k_lease).size() == 2);
     CHECK(ledger.reopened().size() == 6);
-    check_audit(ledger);
+    check_sound(ledger);
     CHECK(ledger.grantable({0, 1}, 9).rounds == 2);  // Up to where another server held them.
     const Lease middle = *ledger.grant(k_c, RoundRun({0, 1}, 1), k_lease, k_lease);
     CHECK(ledger.counts().reallocated == 1);
     CHECK(ledger.grantable({0, 0}, 9).rounds == 1);
     CHECK_FALSE(ledger.grant(k_c, RoundRun({0, 0}, 2), k_lease, k_lease).has_value());
     CHECK(ledger.release(middle.id, k_c, k_lease)->id == middle.id);
-    check_audit(ledger);
+    check_sound(ledger);
 
     // Late, but nobody was quicker.
     CHECK(verdict_of(ledger, claim_of(rest)) == Verdict::accepted);
     CHECK(verdict_of(ledger, claim_of(three)) == Verdict::accepted);
     CHECK(ledger.counts().late == 2);
     CHECK(ledger.complete());
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a late result of which a round is committed counts nothing, and the others are still to be done") {
@@ -500,7 +500,7 @@ TEST_CASE("a late result of which a round is committed counts nothing, and the o
     CHECK(verdict_of(ledger, claim_of(all)) == Verdict::duplicate);
     CHECK(ledger.samples_committed(0) == 1);
     CHECK(ledger.reopened().size() == 2);
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a late result supersedes whoever holds a round of it, and what they hold beyond is open again") {
@@ -519,11 +519,11 @@ TEST_CASE("a late result supersedes whoever holds a round of it, and what they h
     CHECK(commit.superseded.front().id == other.id);
     CHECK(ledger.outstanding() == 0);
     CHECK(ledger.reopened().size() == 2);
-    check_audit(ledger);
+    check_sound(ledger);
     CHECK(verdict_of(ledger, claim_of(other)) == Verdict::duplicate);
     CHECK(verdict_of(ledger, claim_of(next)) == Verdict::accepted);  // It is remembered still.
     CHECK(ledger.complete());
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("a straggler's rounds are copied together") {
@@ -534,11 +534,11 @@ TEST_CASE("a straggler's rounds are copied together") {
     CHECK(copy.count == slow.count);
     CHECK(ledger.expire(k_lease).size() == 1);
     CHECK(ledger.reopened().empty());  // The copy holds them.
-    check_audit(ledger);
+    check_sound(ledger);
     CHECK(verdict_of(ledger, claim_of(copy)) == Verdict::accepted);
     CHECK(verdict_of(ledger, claim_of(slow)) == Verdict::duplicate);
     CHECK(ledger.complete());
-    check_audit(ledger);
+    check_sound(ledger);
 }
 
 TEST_CASE("no claim about rounds is too large to be judged") {
@@ -556,7 +556,7 @@ TEST_CASE("no claim about rounds is too large to be judged") {
               (number == 6 || number == 7 ? Verdict::duplicate : Verdict::mismatched));
         claim.unit = number;
         claim.count = 2;
-        CHECK(verdict_of(ledger, claim) == (number == 1 ? Verdict::unknown : Verdict::mismatched));
+        CHECK(verdict_of(ledger, claim) == (number == 1 ? Verdict::forgotten : Verdict::mismatched));
     }
-    check_audit(ledger);
+    check_sound(ledger);
 }

@@ -27,8 +27,8 @@ MadeUpFrame small_frame(std::size_t kind) {
 }
 
 void check_account(const MadeUpFrame& frame) {
-    const auto audit = frame.work.indirect_ledger().audit();
-    CHECK(bool(audit), audit.error().message);
+    const auto sound = frame.work.indirect_ledger().check_invariants();
+    CHECK(bool(sound), sound.error().message);
 }
 
 void resume_from_anything(std::string_view bytes) {

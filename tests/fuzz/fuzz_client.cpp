@@ -43,7 +43,7 @@ class ClientScript : private ClientWorld {
         for (int step = 0; step < k_most_steps && !in_.empty(); ++step) {
             (this->*k_steps[in_.below(k_steps.size())])();
             machine_.on_timers(now_);
-            const auto sound = machine_.work().indirect_ledger().audit();
+            const auto sound = machine_.work().indirect_ledger().check_invariants();
             CHECK(bool(sound), sound.error().message);
             CHECK(machine_.next_timer(now_) >= now_, now_);
         }

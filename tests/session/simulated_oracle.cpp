@@ -58,14 +58,14 @@ bool SimulatedCluster::someone_can_work() const {
 
 void SimulatedCluster::check_all() {
     const FrameWork& work = client_->machine().work();
-    if (const auto audit = work.indirect_ledger().audit(); !audit) fail(audit.error().message);
+    if (const auto sound = work.indirect_ledger().check_invariants(); !sound) fail(sound.error().message);
     for (const auto& server : servers_) {
         check_dialler(*server);
         if (server->machine().welcomed() && !may_serve(*server)) fail("a server of other bits was admitted");
     }
     for (const auto& relay : relays_) {
         check_dialler(*relay);
-        if (const auto audit = relay->relay_machine().work().audit(); !audit) fail(audit.error().message);
+        if (const auto sound = relay->relay_machine().work().check_invariants(); !sound) fail(sound.error().message);
         if (relay->relay_machine().work().leases() > k_most_credits) fail("a relay holds too many leases");
     }
     // A relay whose servers have all fallen silent is stuck, until it finds out.

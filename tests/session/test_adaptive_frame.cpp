@@ -126,7 +126,7 @@ void finish_in_disorder(RoomFrame& frame, ScheduleKind schedule, std::uint32_t s
         held.pop_back();
     }
     CAPTURE(name_of(schedule));
-    CHECK(bool(frame.work.indirect_ledger().audit()));
+    CHECK(bool(frame.work.indirect_ledger().check_invariants()));
 }
 
 }  // namespace

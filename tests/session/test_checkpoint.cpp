@@ -92,7 +92,7 @@ TEST_CASE(
             CHECK(last.store.total(Counter::rounds_committed) == last.store.total(Counter::rounds));
             CHECK(last.work.indirect_ledger().rounds_committed() ==
                   calm.work.indirect_ledger().rounds_committed());
-            CHECK(bool(last.work.indirect_ledger().audit()));
+            CHECK(bool(last.work.indirect_ledger().check_invariants()));
         }
     }
 }
@@ -106,7 +106,7 @@ TEST_CASE("what is taken up is what there was: the file of it has the same bytes
             REQUIRE(bool(after.resume(before.file())));
             check_same_light(before.work, after.work);
             CHECK(before.file() == after.file());
-            CHECK(bool(after.work.indirect_ledger().audit()));
+            CHECK(bool(after.work.indirect_ledger().check_invariants()));
             CHECK(after.store.total(Counter::samples) == before.samples_merged);
             CHECK(after.store.server(k_local_server)->total(Counter::samples) == 0);  // It did nothing yet.
         }
@@ -173,7 +173,7 @@ TEST_CASE("whatever a file with a right seal says, nothing breaks") {
             if (rng.next_u32() % 4 == 0) bad.resize(64 + rng.next_u32() % (bad.size() - 64));
             MadeUpFrame frame(checkpoint_plan(rule));
             if (!frame.resume(sealed_again(bad))) continue;
-            REQUIRE(bool(frame.work.indirect_ledger().audit()));
+            REQUIRE(bool(frame.work.indirect_ledger().check_invariants()));
             frame.finish();
         }
     }

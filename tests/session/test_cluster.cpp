@@ -167,7 +167,7 @@ TEST_CASE("S9: the image has the same bits for any number of servers, schedule, 
         REQUIRE(finish(*client));
         CHECK(hash_of(*client) == expected);
         CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
-        CHECK(bool(client->work().indirect_ledger().audit()));
+        CHECK(bool(client->work().indirect_ledger().check_invariants()));
         CHECK(store.servers().size() == std::size_t(c.servers) + 1);
         if (c.servers > 0) CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
     }
@@ -266,7 +266,7 @@ TEST_CASE("an input in mid-frame reaches the servers, and no result of the old e
     }
     REQUIRE(finish(*client));
     CHECK(hash_of(*client) == small.hash_of_one_machine(state));
-    CHECK(bool(client->work().indirect_ledger().audit()));
+    CHECK(bool(client->work().indirect_ledger().check_invariants()));
     CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
 }
 
@@ -287,7 +287,7 @@ TEST_CASE("adaptive rounds have the same bits alone and with servers, scouts tra
         REQUIRE(finish(*client));
         CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
         CHECK(store.total(Counter::bad_messages) == 0);
-        CHECK(bool(client->work().indirect_ledger().audit()));
+        CHECK(bool(client->work().indirect_ledger().check_invariants()));
         if (servers > 0) CHECK(store.server(k_local_server)->total(Counter::rounds_committed) == 0);
         hashes.push_back(hash_of(*client));
         errors.push_back(client->work().estimated_error());
@@ -467,5 +467,5 @@ TEST_CASE(
     }
     CHECK(hash_of(*client) == small.hash_of_one_machine());
     CHECK(store.server(k_local_server)->total(Counter::rounds_committed) > 0);
-    CHECK(bool(client->work().indirect_ledger().audit()));
+    CHECK(bool(client->work().indirect_ledger().check_invariants()));
 }

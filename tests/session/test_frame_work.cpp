@@ -93,7 +93,7 @@ TEST_CASE("each sample of each block is granted once, and its light added once")
     CHECK(frame.work.complete());
     CHECK(frame.work.direct_progress() == 1);
     CHECK(frame.work.indirect_progress() == 1);
-    CHECK(bool(frame.work.indirect_ledger().audit()));
+    CHECK(bool(frame.work.indirect_ledger().check_invariants()));
 
     const BlockGrid& grid = frame.work.indirect().grid();
     const Image direct = frame.work.direct().mean(), indirect = frame.work.indirect().mean();
@@ -192,7 +192,7 @@ TEST_CASE(
     const std::vector<PixelSum> before(finished.begin(), finished.end());
     CHECK(frame.work.undo(7, 0) == 3);
     CHECK(frame.work.undo(7, 0) == 0);
-    CHECK(frame.work.indirect_ledger().audit());
+    CHECK(frame.work.indirect_ledger().check_invariants());
     CHECK_FALSE(frame.work.has_image());
     CHECK(frame.work.indirect_progress() == doctest::Approx(14.0 / 15));
     CHECK(frame.work.indirect().samples_of_block(7) == 0);
@@ -201,7 +201,7 @@ TEST_CASE(
     CHECK(frame.work.indirect().sum_at(rect.x - 1, rect.y) != PixelSum{});
 
     CHECK(frame.finish(LightPart::indirect) == 3);
-    CHECK(frame.work.indirect_ledger().audit());
+    CHECK(frame.work.indirect_ledger().check_invariants());
     const auto again = frame.work.indirect().sums();
     CHECK(std::vector<PixelSum>(again.begin(), again.end()) == before);
 }
@@ -216,7 +216,7 @@ TEST_CASE("what another run brought stays when a unit is undone, and when the fr
     const auto is_as_restored = [&] {
         const auto sums = frame.work.indirect().sums();
         return std::vector<PixelSum>(sums.begin(), sums.end()) == snapshot.indirect.sums &&
-               frame.work.indirect_ledger().rounds_committed() == 20 && frame.work.indirect_ledger().audit();
+               frame.work.indirect_ledger().rounds_committed() == 20 && frame.work.indirect_ledger().check_invariants();
     };
     CHECK(is_as_restored());
     CHECK(frame.finish(LightPart::indirect) == 25);

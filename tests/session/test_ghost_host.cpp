@@ -120,7 +120,7 @@ TEST_CASE("ghosts complete a frame, each round counted once, and the next one of
     REQUIRE(finish(**client));
     constexpr std::uint64_t k_rounds = 5 * 3 * 4;  // 70x40 in blocks of 16, 8 samples in rounds of 2.
     CHECK((*client)->work().indirect_ledger().rounds_committed() == k_rounds);
-    CHECK((*client)->work().indirect_ledger().audit());
+    CHECK((*client)->work().indirect_ledger().check_invariants());
     CHECK(store.total(Counter::rounds_committed) == k_rounds);
     CHECK(store.total(Counter::samples) == 70 * 40 * 8);
     CHECK(store.total(Counter::bad_messages) == 0);
@@ -137,7 +137,7 @@ TEST_CASE("ghosts complete a frame, each round counted once, and the next one of
     (*client)->change_state(state);
     REQUIRE(finish(**client));
     CHECK((*client)->work().indirect_ledger().rounds_committed() == 3 * 3 * 4);
-    CHECK((*client)->work().indirect_ledger().audit());
+    CHECK((*client)->work().indirect_ledger().check_invariants());
     CHECK(store.total(Counter::bad_messages) == 0);
 }
 

@@ -110,8 +110,11 @@ class Cluster(unittest.TestCase):
             self.assertGreater(link["connections"], link["cuts"])  # Servers dialled again after each.
 
     def test_half_close_and_refusal(self):
-        _, faults = self.render_through("600ms fault half-close up link 3\n1s fault half-close down link 2\n"
-                                        "1.4s fault refuse on\n1.5s fault cut\n2.5s fault refuse off\n", speed_cap=150_000)
+        """Refused are the first to dial, for whom the client waits, and those that are cut off: if it has not rendered the rest
+        by itself before they dial again."""
+        _, faults = self.render_through("0s fault refuse on\n1500ms fault refuse off\n"
+                                        "3s fault half-close up link 3\n3400ms fault half-close down link 2\n"
+                                        "3800ms fault refuse on\n3900ms fault cut\n5s fault refuse off\n", speed_cap=150_000)
         self.assertGreaterEqual(faults["links"][2]["up"]["half_closes"], 1)
         self.assertGreaterEqual(sum(link["refused"] for link in faults["links"]), 1)
 

@@ -111,13 +111,25 @@ class Faults(unittest.TestCase):
         self.check(stats, died=1)
         self.assertIn("other is lost: Its connection is gone.", run.said)
 
-    def test_frozen(self):
+    def freeze(self, count):
+        """Of three servers, so many; the statistics of the run."""
         run = Run(self.folder, "--servers", "3")
-        frozen = run.working_servers(3)[0]
-        os.kill(frozen, signal.SIGSTOP)
+        frozen = run.working_servers(3)[:count]
+        for pid in frozen:
+            os.kill(pid, signal.SIGSTOP)
         stats = run.finish()
-        self.check(stats, died=1)
-        self.assertFalse(pathlib.Path(f"/proc/{frozen}").exists(), "the frozen server was left behind")
+        for pid in frozen:
+            self.assertFalse(pathlib.Path(f"/proc/{pid}").exists(), "a frozen server was left behind")
+        return stats
+
+    def test_one_frozen(self):
+        """The others may be done before its silence is long enough to be called its death."""
+        stats = self.freeze(1)
+        self.check(stats, died=sum(server["died"] for server in stats["servers"]))
+
+    def test_all_frozen(self):
+        """The frame cannot end before all of them are given up."""
+        self.check(self.freeze(3), died=3)
 
     def test_all_killed_S13(self):
         run = Run(self.folder, "--servers", "3")

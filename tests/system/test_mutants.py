@@ -295,7 +295,7 @@ class Mutants(unittest.TestCase):
                           ("    return double(part.ledger.rounds_committed()) /\n", "    return !complete(part) ? 0 : double(part.ledger.rounds_committed()) /\n"))
 
     def test_S13_without_servers_there_is_direct_light_alone(self):
-        self.check_defect(13, "src/session/client_work.cpp",
+        self.check_defect(13, "src/session/client_leases.cpp",
                           ("    bool idle = false;\n    if (std::exchange(serve_all_", "    announced_alone_ = false;\n    bool idle = false;\n    if (std::exchange(serve_all_"))
 
 

@@ -7,14 +7,16 @@ to the last bit.
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import urllib.request
 
-from processes import free_ports
+from processes import free_ports, wait_for
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, "tools/cycles")
@@ -52,6 +54,14 @@ class PythonWorker(unittest.TestCase):
                           "--size", f"{WIDTH}x{HEIGHT}", "--spp", SPP, "--block", BLOCK, "--indirect-only", "--strategy", strategy,
                           "--listen", "127.0.0.1", "--ports", self.ports, *options)
 
+    def tiles_of(self, client):
+        """How many came so far, by its page of metrics."""
+        url = re.search(r"http://\S+/metrics", self.said(client))
+        if not url:
+            return 0
+        page = urllib.request.urlopen(url[0], timeout=PATIENCE_S).read().decode()
+        return sum(float(value) for value in re.findall(r"^pathscope_tiles_total\S* (\S+)$", page, re.MULTILINE))
+
     def worker(self, name, seconds_per_tile=0.0):
         return self.start("tools/python-worker", "--ports", self.ports, "--name", name, "--seconds-per-tile",
                           seconds_per_tile)
@@ -85,7 +95,8 @@ class PythonWorker(unittest.TestCase):
         self.assertEqual(self.said(worker), "")
 
     def test_beside_a_server_of_ours(self):
-        client = self.client("--min-servers", "2")
+        """Each has its own blocks: else ours would be done before the other's first tile."""
+        client = self.client("--min-servers", "2", "--schedule", "static")
         self.worker("python", 0.005)
         self.server("ours")
         stats, servers = self.finish(client)
@@ -94,13 +105,9 @@ class PythonWorker(unittest.TestCase):
         self.assertGreater(servers["ours"]["tiles"], 0)
 
     def test_workers_that_are_killed_that_leave_and_that_come(self):
-        client = self.client("--min-servers", "3")
+        client = self.client("--min-servers", "3", "--metrics", "127.0.0.1:0")
         first, second, _ = (self.worker(f"python-{i}", 0.05) for i in range(3))
-        limit = time.monotonic() + PATIENCE_S
-        while "Waiting" not in self.said(client):
-            self.assertLess(time.monotonic(), limit)
-            time.sleep(0.02)
-        time.sleep(1.2)
+        wait_for(lambda: self.tiles_of(client) >= 6, "tiles", PATIENCE_S)
         first.kill()
         second.send_signal(signal.SIGTERM)
         self.worker("late")

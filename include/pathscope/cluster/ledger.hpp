@@ -14,10 +14,10 @@
 ///            release         v      |        commit (a late result is welcome)
 ///                            reopened  ----------------->  committed
 ///
-/// Invariants, which audit() recomputes from the records at any moment:
+/// Invariants, which check_invariants() recomputes from the records at any moment:
 ///   rounds    each is committed at most once; when complete(), exactly once
 ///   leases    granted = outstanding + returned + superseded + released + expired + revoked + dropped
-///   results   received = accepted + duplicates + stale + unknown + mismatched
+///   results   received = accepted + duplicates + stale + unknown + forgotten + mismatched
 ///   between   accepted = returned + late;  committed = rounds of accepted results + restored - undone
 ///   runs      a result is taken whole or not at all: it has no round that is committed already;
 ///             two leases that are outstanding and share a round have all their rounds in common
@@ -34,7 +34,8 @@
 ///
 /// No socket, no clock (`now` is an argument and never falls). If there is an event store, every decision is
 /// recorded there with its reason, and counted (rounds, leases, refused results; who merges counts samples,
-/// tiles and latency). Cost: O(log n) per call, n = leases known; revoke and new_epoch O(n).
+/// tiles and latency). Cost: O(r log n) per call, r = rounds of the lease, n = leases known; a reopened round is found in
+/// O(those waiting); revoke, undo and new_epoch O(n).
 /// Thread safety: one thread at a time.
 /// Test: tests/cluster/test_ledger.cpp, test_simulation.cpp
 
@@ -148,16 +149,20 @@ enum class Verdict {
     accepted,     ///< Merge it: the first result of its rounds.
     duplicate,    ///< One of its rounds was committed already.
     stale_epoch,  ///< Of an old epoch.
-    unknown,      ///< No such lease was granted, or so long ago that it is forgotten.
+    unknown,      ///< No such lease was granted.
+    forgotten,    ///< Of a lease that was given back, or ended so long ago that its round remembers only later ones.
     mismatched,   ///< Another unit, range or server than its lease says.
 };
 
 inline constexpr std::array k_verdict_names{
     EnumName{Verdict::accepted, "accepted"},       EnumName{Verdict::duplicate, "duplicate"},
     EnumName{Verdict::stale_epoch, "stale_epoch"}, EnumName{Verdict::unknown, "unknown"},
-    EnumName{Verdict::mismatched, "mismatched"},
+    EnumName{Verdict::forgotten, "forgotten"},     EnumName{Verdict::mismatched, "mismatched"},
 };
 constexpr const auto& enum_table(Verdict) { return k_verdict_names; }
+
+/// Where a result that is not accepted is counted.
+[[nodiscard]] Counter refusal_counter(Verdict refusal);
 
 struct Commit {
     Verdict verdict = Verdict::unknown;
@@ -183,6 +188,7 @@ struct LedgerCounts {
     std::uint64_t duplicates = 0;
     std::uint64_t stale = 0;
     std::uint64_t unknown = 0;
+    std::uint64_t forgotten = 0;
     std::uint64_t mismatched = 0;
     // Among them.
     std::uint64_t late = 0;             ///< Accepted after the lease had ended.
@@ -294,7 +300,7 @@ class Ledger {
     [[nodiscard]] std::vector<Lease> outstanding_leases() const;
     [[nodiscard]] std::size_t outstanding() const { return outstanding_; }
     [[nodiscard]] std::size_t outstanding(ServerId server) const;
-    /// The oldest outstanding lease of other servers whose round nobody else holds.
+    /// The oldest outstanding lease of other servers whose rounds nobody else holds.
     [[nodiscard]] std::optional<Lease> oldest_uncopied(ServerId not_of) const;
     [[nodiscard]] std::optional<Lease> find(LeaseId lease) const;  ///< Outstanding ones only.
 
@@ -310,7 +316,7 @@ class Ledger {
     [[nodiscard]] const LedgerCounts& counts() const { return counts_; }
 
     /// Recomputes every invariant above from the records; an error is a bug, and says which one broke.
-    [[nodiscard]] Result<void> audit() const;
+    [[nodiscard]] Result<void> check_invariants() const;
 
   private:
     struct Unit {
@@ -344,9 +350,10 @@ class Ledger {
     void note_holders(const Active& active);
     void end_without_result(Record& record, UnitReason reason, TimeNs now);
     void close_again(RoundKey round);
-    [[nodiscard]] Result<void> audit_balances() const;
-    [[nodiscard]] Result<void> audit_records() const;
-    [[nodiscard]] Result<void> audit_units() const;
+    [[nodiscard]] Result<void> check_balances() const;
+    [[nodiscard]] Result<void> check_rounds() const;
+    [[nodiscard]] Result<void> check_leases() const;
+    [[nodiscard]] Result<void> check_units() const;
     void note(const Lease& lease, UnitChange change, UnitReason reason, TimeNs now,
               ServerId previous = {}) const;
     void count(Counter counter, std::uint64_t n, ServerId server) const;

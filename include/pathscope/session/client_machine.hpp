@@ -237,9 +237,7 @@ class ClientMachine {
     void watch_frames(const Server& server);
     void watch_heartbeats();
 
-    // client_work.cpp: leases out, light in.
-    void on(Server& server, message::Tile& message);
-    void on(Server& server, message::Nack& message);
+    // client_leases.cpp: leases out.
     [[nodiscard]] int alive_servers() const;
     [[nodiscard]] bool expects_servers() const;
     [[nodiscard]] bool renders_alone() const;
@@ -248,7 +246,6 @@ class ClientMachine {
     void hand_out();
     void hand_out_to_servers();
     bool hand_out_to(Server& server);
-    [[nodiscard]] std::uint64_t most_result_bytes() const;
     [[nodiscard]] std::size_t window_of(const Server& server) const;
     [[nodiscard]] std::uint32_t rounds_per_lease_of(const Server& server) const;
     bool grant_to(Server& server);
@@ -256,13 +253,17 @@ class ClientMachine {
     void send_lease(Server& server, const Lease& lease);
     [[nodiscard]] std::optional<LocalWork> next_local_work();
     void hand_out_locally();
+    void begin_local(LocalWork work);
+
+    // client_work.cpp: light in.
+    void on(Server& server, message::Tile& message);
+    void on(Server& server, message::Nack& message);
     void settle(LightPart part, const Lease& lease, const std::optional<RoundResult>& result);
     void count_result(const RoundResult& result, ServerId server);
     void cancel_superseded(const std::vector<Lease>& leases);
     void cancel(const Lease& lease);
-    void begin_local(LocalWork work);
     void release(LeaseId lease, ServerId server);
-    std::size_t revoke(ServerId server);  ///< How many rounds were reopened.
+    std::size_t revoke(ServerId server);  ///< How many leases ended.
 
     // client_audit.cpp: a second opinion.
     void note_merged(LightPart part, const ResultClaim& claim, std::uint32_t rounds,

@@ -47,7 +47,9 @@ class ClientSockets {
     void watch_door(const Readable& ready, std::size_t first, EventStore& store, Machine& machine) {
         const TimeNs now = monotonic_now();
         // To ask the door costs several system calls: when there is a knock, and now and then.
-        if ((ready >> (first + k_sockets)).any() || now >= next_door_look_) {
+        bool knock = false;
+        for (std::size_t i = 0; i < door_.watched(); ++i) knock = knock || ready[first + k_sockets + i];
+        if (knock || now >= next_door_look_) {
             next_door_look_ = now + k_door_watch;
             const Door::News news = door_.step(now, bound_.input);
             if (news.refused > 0) store.count(Counter::refused_peers, news.refused);

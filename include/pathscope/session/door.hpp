@@ -71,6 +71,7 @@ class Door {
     /// pollables() is ready.
     News step(TimeNs now, PublisherSocket& input);
     [[nodiscard]] std::vector<Pollable> pollables() const;
+    [[nodiscard]] std::size_t watched() const { return watches_.size(); }  ///< As many are its pollables.
 
   private:
     explicit Door(const Context& context) : context_(context) {}

@@ -82,6 +82,9 @@ class FrameWork final : public IndirectWork {
     [[nodiscard]] double samples_of_full_round() const override {
         return double(plan_.block_size) * plan_.block_size * plan_.round_samples;
     }
+    [[nodiscard]] std::uint64_t most_pixels() const override {
+        return std::uint64_t(plan_.block_size) * std::uint64_t(plan_.block_size);
+    }
     [[nodiscard]] std::size_t outstanding() const override { return indirect_.ledger.outstanding(); }
     [[nodiscard]] std::size_t outstanding(ServerId server) const override {
         return indirect_.ledger.outstanding(server);

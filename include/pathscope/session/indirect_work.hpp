@@ -51,7 +51,7 @@ class IndirectWork {
 
     /// Leases that end without a result: their rounds are open again. A lease that is not known is ignored.
     virtual void release(LeaseId lease, ServerId server, TimeNs now) = 0;
-    virtual std::size_t revoke(ServerId server, TimeNs now) = 0;  ///< How many.
+    virtual std::size_t revoke(ServerId server, TimeNs now) = 0;  ///< How many leases.
     virtual void expire(TimeNs now) = 0;
     [[nodiscard]] virtual std::optional<TimeNs> next_deadline() const = 0;
 
@@ -60,6 +60,7 @@ class IndirectWork {
     /// Requires: judge(claim) is `accepted`.
     [[nodiscard]] virtual PixelRect rect_of(const ResultClaim& claim) const = 0;
     [[nodiscard]] virtual double samples_of_full_round() const = 0;  ///< Of all its pixels.
+    [[nodiscard]] virtual std::uint64_t most_pixels() const = 0;     ///< That a lease has.
     [[nodiscard]] virtual std::size_t outstanding() const = 0;
     [[nodiscard]] virtual std::size_t outstanding(ServerId server) const = 0;
     [[nodiscard]] virtual std::uint64_t rounds_open()

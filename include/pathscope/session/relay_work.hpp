@@ -70,6 +70,7 @@ class RelayWork final : public IndirectWork {
     [[nodiscard]] Round round_of(const Lease& lease) const override;
     [[nodiscard]] PixelRect rect_of(const ResultClaim& claim) const override;
     [[nodiscard]] double samples_of_full_round() const override { return usual_samples_; }
+    [[nodiscard]] std::uint64_t most_pixels() const override { return most_pixels_; }
     [[nodiscard]] std::size_t outstanding() const override;
     [[nodiscard]] std::size_t outstanding(ServerId server) const override;
     [[nodiscard]] std::uint64_t rounds_open() const override { return rounds_open_; }
@@ -80,10 +81,11 @@ class RelayWork final : public IndirectWork {
     // -- View -----------------------------------------------------------------------------------------------
     [[nodiscard]] std::size_t leases() const { return jobs_.size(); }  ///< Of the client above.
     [[nodiscard]] bool has_begun(std::uint64_t ticket) const;          ///< Some round of it was given out.
+    [[nodiscard]] std::size_t numbers_known() const { return known_.size(); }  ///< Of leases below.
     /// Leases that are needed to have so many rounds.
     [[nodiscard]] std::uint32_t leases_for(std::size_t rounds) const;
     /// Recomputes what must hold; an error is a bug.
-    [[nodiscard]] Result<void> audit() const;
+    [[nodiscard]] Result<void> check_invariants() const;
 
   private:
     /// A lease of the client above.
@@ -91,9 +93,9 @@ class RelayWork final : public IndirectWork {
         RoundJob asked;
         Ledger ledger;                   ///< One unit; samples counted from the lease's first.
         RoundResult result{};            ///< So far.
-        TimeNs begun = 0;                ///< When its first round was given out.
+        std::optional<TimeNs> begun{};   ///< When its first round was given out.
         TimeNs worked = 0;               ///< By all servers together.
-        std::vector<LeaseId> numbers{};  ///< Of the account's leases, as servers below know them.
+        std::map<LeaseId, LeaseId> numbers{};  ///< Of the account's leases, as servers below know them.
     };
     using Jobs = std::map<std::uint64_t, Job>;  ///< By ticket: oldest first.
     struct Known {
@@ -123,6 +125,7 @@ class RelayWork final : public IndirectWork {
     SpeedEstimate speed_{};  ///< Of one server.
     double usual_samples_ = 0;
     std::uint32_t usual_rounds_ = 1;  ///< Of a lease.
+    std::uint64_t most_pixels_ = 0;   ///< Of a lease so far.
     std::uint64_t rounds_open_ = 0, rounds_committed_ = 0;
 };
 
