@@ -25,10 +25,11 @@ function(pathscope_module_tests name)
     if(sources AND BUILD_TESTING)
         add_executable(test_${name} ${sources})
         # Compiled together, each file begins with our CHECK, and testing.hpp takes it over in each.
-        set_target_properties(test_${name} PROPERTIES
+        set_target_properties(test_${name} PROPERTIES UNITY_BUILD ${PATHSCOPE_JOIN_TESTS}
             UNITY_BUILD_CODE_BEFORE_INCLUDE "#include \"pathscope/core/check.hpp\"\n#pragma push_macro(\"CHECK\")"
             UNITY_BUILD_CODE_AFTER_INCLUDE "#pragma pop_macro(\"CHECK\")")
         target_link_libraries(test_${name} PRIVATE pathscope_${name} pathscope_flags pathscope_test_support pathscope_test_main)
+        target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # What they test is optimised; they need not be.
         add_test(NAME ${name} COMMAND test_${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
     endif()
 endfunction()
@@ -42,6 +43,9 @@ function(pathscope_program name)
     target_link_libraries(${name} PRIVATE ${modules} ${ARG_LIBRARIES} pathscope_flags)
     target_compile_definitions(${name} PRIVATE PATHSCOPE_VERSION="${PROJECT_VERSION}")
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+    # What reads the command line runs once, and its library takes the compiler longer than all else.
+    file(GLOB command_line ${PROJECT_SOURCE_DIR}/tools/${name}/options.cpp)
+    set_source_files_properties(${command_line} PROPERTIES COMPILE_OPTIONS -O0 SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
 # tests/fuzz/fuzz_*.cpp are fuzz targets, each compiled once. test_fuzz runs all of them over the kept corpus. With PATHSCOPE_FUZZ

@@ -1,4 +1,4 @@
-# The sanitizers' builds (CMAKE_UNITY_BUILD) compile the files of a folder together: what most of them include is read once, what
+# The sanitizers' builds (CMAKE_UNITY_BUILD), and tests in all builds but `dev`, compile the files of a folder together: what most of them include is read once, what
 # most of them instantiate is made once, and that is most of the work. A name that two files of a folder give to different things
 # then stops the compiler; the second file is listed here and stays alone, unless the two can share the thing.
 file(GLOB apart ${PROJECT_SOURCE_DIR}/*/*/*_avx2.cpp ${PROJECT_SOURCE_DIR}/*/*/*_avx512.cpp  # These set the instructions of all that follows.

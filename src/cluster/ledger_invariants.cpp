@@ -19,8 +19,7 @@ Result<void> Ledger::check_balances() const {
     if (c.granted != outstanding_ + ended)
         return failed(fmt::format("Ledger: {} leases were granted, but {} are outstanding and {} ended.",
                                   c.granted, outstanding_, ended));
-    const std::uint64_t judged =
-        c.accepted + c.duplicates + c.stale + c.unknown + c.forgotten + c.mismatched;
+    const std::uint64_t judged = c.accepted + c.duplicates + c.stale + c.unknown + c.forgotten + c.mismatched;
     if (c.received != judged)
         return failed(fmt::format("Ledger: {} results came, but {} were judged.", c.received, judged));
     if (c.accepted != c.returned + c.late)

@@ -343,6 +343,7 @@ TEST_CASE("each light sampler draws directions with the density it reports") {
     cases.push_back({"sky behind quad", overlap()});
     cases.push_back({"sky behind quad, equal shares", overlap(), LightSampling::area});
 
+    if (k_sanitized) cases.resize(4);
     const LightReference reference{{0.1f, 0, 0.2f}, {0, 0, 1}};
     for (const Case& each : cases) {
         CAPTURE(each.name);

@@ -65,7 +65,8 @@ void SimulatedCluster::check_all() {
     }
     for (const auto& relay : relays_) {
         check_dialler(*relay);
-        if (const auto sound = relay->relay_machine().work().check_invariants(); !sound) fail(sound.error().message);
+        if (const auto sound = relay->relay_machine().work().check_invariants(); !sound)
+            fail(sound.error().message);
         if (relay->relay_machine().work().leases() > k_most_credits) fail("a relay holds too many leases");
     }
     // A relay whose servers have all fallen silent is stuck, until it finds out.

@@ -7,13 +7,12 @@
 #include <mutex>
 #include <thread>
 
-#include "pathscope/image/image_hash.hpp"
 #include "pathscope/net/dealer.hpp"
 #include "pathscope/net/poller.hpp"
-#include "pathscope/render/rendered_frame.hpp"
 #include "pathscope/session/admission.hpp"
-#include "pathscope/session/client_session.hpp"
 #include "pathscope/session/server_session.hpp"
+
+#include "small_job.hpp"
 
 #include "testing.hpp"
 
@@ -21,35 +20,6 @@ using namespace pathscope;
 using namespace pathscope::testing;
 
 namespace {
-
-constexpr TimeNs k_patience = 120 * k_second_ns;  ///< A test that waits longer has failed.
-
-/// Our Cornell box in a few pixels.
-struct SmallJob {
-    OpenedScene opened;
-    std::shared_ptr<const Scene> scene;
-    RenderState state;
-
-    explicit SmallJob(std::uint32_t spp = 8) : opened(*open_scene("scenes/cornell/scene.json", {})) {
-        scene = std::make_shared<const Scene>(*make_scene(opened.file, opened.parts, {.threads = 1}));
-        state.scene = opened.file;
-        state.camera = opened.file.cameras.front().view;
-        state.settings.width = 70;
-        state.settings.height = 40;
-        state.settings.spp = spp;
-        state.settings.direct_spp = 2;
-        state.settings.seed = 7;
-        state.settings.quantum = quantum_for(scene->typical_radiance, scene->brightest_radiance);
-    }
-    [[nodiscard]] ClientJob job() const { return {state, scene, SceneDepot(*opened.files)}; }
-
-    /// What every distributed image must equal.
-    [[nodiscard]] Digest hash_of_one_machine(const RenderState& wanted) const {
-        const LocalRender local = render_locally(*scene, wanted.camera, wanted.settings, 64, 1);
-        return image_hash(compose_frame(local.direct, local.indirect, wanted.settings, {}, 1).combined);
-    }
-    [[nodiscard]] Digest hash_of_one_machine() const { return hash_of_one_machine(state); }
-};
 
 ClientConfig listening(int min_servers) {
     ClientConfig config;
@@ -61,13 +31,6 @@ ClientConfig listening(int min_servers) {
     config.block_size = 16;
     config.round_samples = 2;
     return config;
-}
-
-std::array<int, 3> ports_of(const ClientSession& client) {
-    std::array<int, 3> ports;
-    for (std::size_t i = 0; i < ports.size(); ++i)
-        ports[i] = std::stoi(client.endpoints()[i].substr(client.endpoints()[i].rfind(':') + 1));
-    return ports;
 }
 
 /// A server on a thread of its own; it is told to stop at the end of the scope.
@@ -121,25 +84,6 @@ class Gate {
     bool open_ = false;
 };
 
-/// Steps the client until `done`; false when patience ends.
-bool step_until(ClientSession& client, const std::function<bool()>& done) {
-    const TimeNs limit = monotonic_now() + k_patience;
-    while (!done()) {
-        if (monotonic_now() > limit) return false;
-        client.step(50 * k_millisecond_ns);
-    }
-    return true;
-}
-
-bool finish(ClientSession& client) {
-    return step_until(client, [&] { return client.complete(); });
-}
-
-Digest hash_of(const ClientSession& client) {
-    const FrameWork& work = client.work();
-    return image_hash(compose_frame(work.direct(), work.indirect(), client.state().settings, {}, 1).combined);
-}
-
 }  // namespace
 
 TEST_CASE("S9: the image has the same bits for any number of servers, schedule, block and round size") {
@@ -163,7 +107,7 @@ TEST_CASE("S9: the image has the same bits for any number of servers, schedule, 
         const auto client = std::move(*ClientSession::create(config, small.job(), store));
         std::vector<std::unique_ptr<RunningServer>> servers;
         for (int i = 0; i < c.servers; ++i)
-            servers.push_back(std::make_unique<RunningServer>(ports_of(*client), cache.path()));
+            servers.push_back(std::make_unique<RunningServer>(ports_of(client->endpoints()), cache.path()));
         REQUIRE(finish(*client));
         CHECK(hash_of(*client) == expected);
         CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
@@ -179,10 +123,10 @@ TEST_CASE("a server that leaves in mid-frame gives its rounds to the others, one
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
     // Slow, so that it is sure to be in mid-frame when it is told to leave.
-    auto first = std::make_unique<RunningServer>(ports_of(*client), cache.path(), 20'000);
+    auto first = std::make_unique<RunningServer>(ports_of(client->endpoints()), cache.path(), 20'000);
     REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.05; }));
     first->stop();
-    const RunningServer second(ports_of(*client), cache.path());
+    const RunningServer second(ports_of(client->endpoints()), cache.path());
     REQUIRE(finish(*client));
     CHECK(hash_of(*client) == small.hash_of_one_machine());
     CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
@@ -193,7 +137,7 @@ TEST_CASE("S13: when the last server leaves in mid-frame, the client carries on 
     const TemporaryFolder cache;
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
-    RunningServer server(ports_of(*client), cache.path(), 20'000);
+    RunningServer server(ports_of(client->endpoints()), cache.path(), 20'000);
     REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.05; }));
     server.stop();
     REQUIRE(finish(*client));
@@ -212,7 +156,7 @@ TEST_CASE(
     config.round_samples = 4;
     const auto client = std::move(*ClientSession::create(config, small.job(), store));
     // which takes four times as long as silence is borne: 70 * 40 * 4 samples at this speed are 2.8 s.
-    const RunningServer server(ports_of(*client), cache.path(), 4000);
+    const RunningServer server(ports_of(client->endpoints()), cache.path(), 4000);
     REQUIRE(finish(*client));
     CHECK(hash_of(*client) == small.hash_of_one_machine());
     CHECK(store.total(Counter::servers_joined) == 1);
@@ -230,7 +174,7 @@ TEST_CASE("S10: what a server filters is what the client gets, block for block")
         config.block_size = block_size;
         config.round_samples = 4;  // One round for each block: the filter takes a round as it finds it.
         const auto client = std::move(*ClientSession::create(config, small.job(), store));
-        const RunningServer server(ports_of(*client), cache.path());
+        const RunningServer server(ports_of(client->endpoints()), cache.path());
         REQUIRE(finish(*client));
         return hash_of(*client);
     };
@@ -255,7 +199,8 @@ TEST_CASE("an input in mid-frame reaches the servers, and no result of the old e
     ClientConfig config = listening(2);
     config.detector = DetectorKind::fixed;  // Patient: no server is given up because the machine is busy.
     const auto client = std::move(*ClientSession::create(config, small.job(), store));
-    const RunningServer a(ports_of(*client), cache.path()), b(ports_of(*client), cache.path());
+    const RunningServer a(ports_of(client->endpoints()), cache.path()),
+        b(ports_of(client->endpoints()), cache.path());
     RenderState state = small.state;
     for (int move = 1; move <= 3; ++move) {
         REQUIRE(step_until(*client, [&] { return client->work().indirect_progress() > 0.1; }));
@@ -283,7 +228,7 @@ TEST_CASE("adaptive rounds have the same bits alone and with servers, scouts tra
         const auto client = std::move(*ClientSession::create(config, small.job(), store));
         std::vector<std::unique_ptr<RunningServer>> running;
         for (int i = 0; i < servers; ++i)
-            running.push_back(std::make_unique<RunningServer>(ports_of(*client), cache.path()));
+            running.push_back(std::make_unique<RunningServer>(ports_of(client->endpoints()), cache.path()));
         REQUIRE(finish(*client));
         CHECK(store.total(Counter::rounds) == store.total(Counter::rounds_committed));
         CHECK(store.total(Counter::bad_messages) == 0);
@@ -305,7 +250,7 @@ TEST_CASE("S11: a server that loses its client waits for the next one, and serve
     EventStore first_store, second_store;
     auto client = std::move(*ClientSession::create(listening(1), small.job(), first_store));
     ClientConfig again = listening(1);
-    again.ports = ports_of(*client);
+    again.ports = ports_of(client->endpoints());
     again.any_ports = false;
     const RunningServer server(again.ports, cache.path());
     REQUIRE(finish(*client));
@@ -321,7 +266,7 @@ TEST_CASE("garbage, foreign versions and unknown peers are dropped and counted, 
     const TemporaryFolder cache;
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
-    const std::array<int, 3> ports = ports_of(*client);
+    const std::array<int, 3> ports = ports_of(client->endpoints());
 
     const Context context;
     const auto dial = [&](int port) {
@@ -373,8 +318,8 @@ TEST_CASE("a server of another build is refused, and says why") {
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
     const Context context;
     const std::string id = random_routing_id();
-    DealerSocket monitor = std::move(
-        *DealerSocket::connect(context, "tcp://127.0.0.1:" + std::to_string(ports_of(*client)[1]), id));
+    DealerSocket monitor = std::move(*DealerSocket::connect(
+        context, "tcp://127.0.0.1:" + std::to_string(ports_of(client->endpoints())[1]), id));
     REQUIRE(step_until(*client, [&] {
         return monitor.send(encode(message::Hello{id, "old", "0.0", "another build", 1, 0,
                                                   own_bits().golden})) == SendOutcome::delivered;
@@ -392,7 +337,7 @@ TEST_CASE("a port in use is a sentence that names it") {
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(0), small.job(), store));
     ClientConfig config = listening(0);
-    config.ports = ports_of(*client);
+    config.ports = ports_of(client->endpoints());
     config.any_ports = false;
     config.ports_were_chosen = true;
     const auto second = ClientSession::create(config, small.job(), store);
@@ -409,7 +354,7 @@ TEST_CASE("a server of other bits is refused and told why; a relaxed client take
     {
         EventStore store;
         const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
-        RunningServer server(ports_of(*client), cache.path(), 0, foreign);
+        RunningServer server(ports_of(client->endpoints()), cache.path(), 0, foreign);
         std::atomic<bool> ended{false};
         Result<void> result;
         std::thread waiting([&] {
@@ -422,7 +367,7 @@ TEST_CASE("a server of other bits is refused and told why; a relaxed client take
         CHECK(result.error().message.find("golden round has the bits") != std::string::npos);
         CHECK(store.total(Counter::servers_joined) == 0);
         // One of the right bits is welcome all the same.
-        const RunningServer good(ports_of(*client), cache.path());
+        const RunningServer good(ports_of(client->endpoints()), cache.path());
         REQUIRE(finish(*client));
         CHECK(client->differing_rounds() == 0);
     }
@@ -430,7 +375,7 @@ TEST_CASE("a server of other bits is refused and told why; a relaxed client take
     ClientConfig config = listening(1);
     config.relaxed = true;
     const auto client = std::move(*ClientSession::create(config, small.job(), store));
-    const RunningServer server(ports_of(*client), cache.path(), 0, foreign);
+    const RunningServer server(ports_of(client->endpoints()), cache.path(), 0, foreign);
     REQUIRE(finish(*client));
     CHECK(hash_of(*client) == small.hash_of_one_machine());  // It only says that its bits differ.
     CHECK(client->differing_rounds() > 0);
@@ -455,7 +400,7 @@ TEST_CASE(
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(1), small.job(), store));
     {
-        const RunningServer server(ports_of(*client), cache.path(), 0, config);
+        const RunningServer server(ports_of(client->endpoints()), cache.path(), 0, config);
         const TimeNs begun = monotonic_now();
         CHECK(finish(*client));  // By the client alone.
         CHECK(monotonic_now() - begun > ProgressWatch::k_least_patience);

@@ -216,7 +216,8 @@ TEST_CASE("what another run brought stays when a unit is undone, and when the fr
     const auto is_as_restored = [&] {
         const auto sums = frame.work.indirect().sums();
         return std::vector<PixelSum>(sums.begin(), sums.end()) == snapshot.indirect.sums &&
-               frame.work.indirect_ledger().rounds_committed() == 20 && frame.work.indirect_ledger().check_invariants();
+               frame.work.indirect_ledger().rounds_committed() == 20 &&
+               frame.work.indirect_ledger().check_invariants();
     };
     CHECK(is_as_restored());
     CHECK(frame.finish(LightPart::indirect) == 25);

@@ -3,12 +3,11 @@
 #include <functional>
 #include <thread>
 
-#include "pathscope/image/image_hash.hpp"
-#include "pathscope/render/rendered_frame.hpp"
-#include "pathscope/session/client_session.hpp"
 #include "pathscope/session/ghost_host.hpp"
 #include "pathscope/session/relay_session.hpp"
 #include "pathscope/session/server_session.hpp"
+
+#include "small_job.hpp"
 
 #include "testing.hpp"
 
@@ -16,32 +15,6 @@ using namespace pathscope;
 using namespace pathscope::testing;
 
 namespace {
-
-constexpr TimeNs k_patience = 120 * k_second_ns;  ///< A test that waits longer has failed.
-
-/// Our Cornell box in a few pixels.
-struct SmallJob {
-    OpenedScene opened;
-    std::shared_ptr<const Scene> scene;
-    RenderState state;
-
-    SmallJob() : opened(*open_scene("scenes/cornell/scene.json", {})) {
-        scene = std::make_shared<const Scene>(*make_scene(opened.file, opened.parts, {.threads = 1}));
-        state.scene = opened.file;
-        state.camera = opened.file.cameras.front().view;
-        state.settings.width = 50;
-        state.settings.height = 40;
-        state.settings.spp = 24;
-        state.settings.direct_spp = 2;
-        state.settings.seed = 7;
-        state.settings.quantum = quantum_for(scene->typical_radiance, scene->brightest_radiance);
-    }
-    [[nodiscard]] ClientJob job() const { return {state, scene, SceneDepot(*opened.files)}; }
-    [[nodiscard]] Digest hash_of_one_machine(const RenderState& wanted) const {
-        const LocalRender local = render_locally(*scene, wanted.camera, wanted.settings, 64, 1);
-        return image_hash(compose_frame(local.direct, local.indirect, wanted.settings, {}, 1).combined);
-    }
-};
 
 ClientConfig listening() {
     ClientConfig config;
@@ -52,13 +25,6 @@ ClientConfig listening() {
     config.round_samples = 8;
     config.detector = DetectorKind::fixed;  // Patient: no server is given up because the machine is busy.
     return config;
-}
-
-std::array<int, 3> ports_of(const std::array<std::string, 3>& endpoints) {
-    std::array<int, 3> ports;
-    for (std::size_t i = 0; i < ports.size(); ++i)
-        ports[i] = std::stoi(endpoints[i].substr(endpoints[i].rfind(':') + 1));
-    return ports;
 }
 
 /// A session on a thread of its own; it is told to stop at the end of the scope.
@@ -102,22 +68,10 @@ std::unique_ptr<Running<ServerSession>> start_server(std::array<int, 3> ports,
     return std::make_unique<Running<ServerSession>>(ServerSession::create(config));
 }
 
-bool finish(ClientSession& client) {
-    for (const TimeNs limit = monotonic_now() + k_patience; !client.complete();
-         client.step(50 * k_millisecond_ns))
-        if (monotonic_now() > limit) return false;
-    return true;
-}
-
-Digest hash_of(const ClientSession& client) {
-    const FrameWork& work = client.work();
-    return image_hash(compose_frame(work.direct(), work.indirect(), client.state().settings, {}, 1).combined);
-}
-
 }  // namespace
 
 TEST_CASE("behind a relay, and behind a relay of relays, the image has the same bits") {
-    const SmallJob small;
+    const SmallJob small(24);
     const TemporaryFolder relays_cache, servers_cache;
     EventStore store;
     const auto client = std::move(*ClientSession::create(listening(), small.job(), store));
@@ -128,7 +82,7 @@ TEST_CASE("behind a relay, and behind a relay of relays, the image has the same 
     REQUIRE(finish(*client));
     CHECK(hash_of(*client) == small.hash_of_one_machine(small.state));
     CHECK(store.total(Counter::servers_joined) == 1);
-    CHECK(store.total(Counter::samples) == 50 * 40 * 26);
+    CHECK(store.total(Counter::samples) == 70 * 40 * 26);
     CHECK(store.total(Counter::bad_messages) == 0);
 
     // Another camera, and light that loses bits on its way: as of one server that renders whole leases.
@@ -140,7 +94,7 @@ TEST_CASE("behind a relay, and behind a relay of relays, the image has the same 
 }
 
 TEST_CASE("with a wire that loses bits, a relay's tiles are those of a server") {
-    const SmallJob small;
+    const SmallJob small(24);
     const TemporaryFolder cache;
     const auto render = [&](bool relayed) {
         EventStore store;
@@ -162,7 +116,7 @@ TEST_CASE("with a wire that loses bits, a relay's tiles are those of a server") 
 }
 
 TEST_CASE("ghosts behind a relay: the client sees one server, and a tile for each of its leases") {
-    const SmallJob small;
+    const SmallJob small(24);
     const TemporaryFolder cache;
     EventStore store;
     ClientConfig config = listening();
@@ -178,7 +132,7 @@ TEST_CASE("ghosts behind a relay: the client sees one server, and a tile for eac
     const Running<GhostHost> host(GhostHost::create(ghosts));
     REQUIRE(finish(*client));
     CHECK(store.total(Counter::servers_joined) == 1);
-    CHECK(store.total(Counter::tiles) == 4 * 3 * 3);  // 50x40 in blocks of 16, 24 samples in rounds of 8.
-    CHECK(store.total(Counter::samples) == 50 * 40 * 24);
+    CHECK(store.total(Counter::tiles) == 5 * 3 * 3);  // 70x40 in blocks of 16, 24 samples in rounds of 8.
+    CHECK(store.total(Counter::samples) == 70 * 40 * 24);
     CHECK(store.total(Counter::died) == 0);
 }

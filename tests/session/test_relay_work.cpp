@@ -109,7 +109,9 @@ TEST_CASE("a round that is lost, late or copied is in the sum once") {
     CHECK(finished.front().result->sums == flat_sums({8, 16, 4, 2}, 0, 12));
 }
 
-TEST_CASE("a server that gives every lease back fills no memory, and is not believed if a result comes all the same") {
+TEST_CASE(
+    "a server that gives every lease back fills no memory, and is not believed if a result comes all the "
+    "same") {
     RelayWork work;
     work.begin(lease_of(1, 0, 8), 0);
     for (int i = 0; i < 1000; ++i) {

@@ -150,8 +150,8 @@ enum class Verdict {
     duplicate,    ///< One of its rounds was committed already.
     stale_epoch,  ///< Of an old epoch.
     unknown,      ///< No such lease was granted.
-    forgotten,    ///< Of a lease that was given back, or ended so long ago that its round remembers only later ones.
-    mismatched,   ///< Another unit, range or server than its lease says.
+    forgotten,  ///< Of a lease that was given back, or ended so long ago that its round remembers only later ones.
+    mismatched,  ///< Another unit, range or server than its lease says.
 };
 
 inline constexpr std::array k_verdict_names{

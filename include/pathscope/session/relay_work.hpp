@@ -91,10 +91,10 @@ class RelayWork final : public IndirectWork {
     /// A lease of the client above.
     struct Job {
         RoundJob asked;
-        Ledger ledger;                   ///< One unit; samples counted from the lease's first.
-        RoundResult result{};            ///< So far.
-        std::optional<TimeNs> begun{};   ///< When its first round was given out.
-        TimeNs worked = 0;               ///< By all servers together.
+        Ledger ledger;                         ///< One unit; samples counted from the lease's first.
+        RoundResult result{};                  ///< So far.
+        std::optional<TimeNs> begun{};         ///< When its first round was given out.
+        TimeNs worked = 0;                     ///< By all servers together.
         std::map<LeaseId, LeaseId> numbers{};  ///< Of the account's leases, as servers below know them.
     };
     using Jobs = std::map<std::uint64_t, Job>;  ///< By ticket: oldest first.
