@@ -109,6 +109,7 @@ void ClusterTotals::add(const ClusterTotals& other) {
     ledger.duplicates += other.ledger.duplicates;
     ledger.stale += other.ledger.stale;
     ledger.unknown += other.ledger.unknown;
+    ledger.forgotten += other.ledger.forgotten;
     ledger.mismatched += other.ledger.mismatched;
     ledger.superseded += other.ledger.superseded;
     ledger.released += other.ledger.released;

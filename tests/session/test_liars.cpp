@@ -176,3 +176,37 @@ TEST_CASE("an adaptive frame that begins anew keeps the mark that its checkpoint
     CHECK(stage.client().differing_rounds() ==
           marked + stage.store().server(ServerId{2})->total(Counter::differing_rounds));
 }
+
+TEST_CASE("a result so late that its lease is forgotten is dropped, and is no offence of whoever was slow") {
+    const Silence silence;
+    StagedCluster stage(
+        2, [](ClientConfig&, RenderSettings& settings) { settings.width = settings.height = 8; });
+    std::vector<StagedCluster::Server*> servers;
+    for (int i = 0; i < 14; ++i) {
+        servers.push_back(&stage.add_server());
+        servers.back()->renders = false;  // Whoever is given the only round is late with it.
+    }
+    const Ledger& ledger = stage.client().work().indirect_ledger();
+    const auto is_forgotten = [&](std::size_t i) {
+        if (servers[i]->leases.empty()) return false;
+        const message::Lease& lease = servers[i]->leases.back();
+        return ledger.judge({lease.lease, lease.epoch, lease.unit, lease.first, lease.count,
+                             ServerId{std::uint32_t(i) + 1}}) == Verdict::forgotten;
+    };
+    std::size_t slow = 0;
+    REQUIRE(stage.pass_until(
+        [&] {
+            for (slow = 0; slow < servers.size() && !is_forgotten(slow);) ++slow;
+            return slow < servers.size();
+        },
+        600 * k_second_ns));
+    const std::uint64_t refused = stage.store().total(Counter::refused_results);
+    servers[slow]->renders = true;
+    REQUIRE(stage.pass_until([&] { return stage.store().total(Counter::refused_results) > refused; }));
+    CHECK(stage.client().conduct().points(conduct_name("", fmt::format("server-{}", slow + 1), ""),
+                                          stage.now()) == 0);
+    CHECK(stage.committed() == 0);
+    for (StagedCluster::Server* server : servers) server->renders = true;
+    REQUIRE(stage.pass_until([&] { return stage.client().complete(); }));
+    CHECK(stage.picture_is_right());
+}

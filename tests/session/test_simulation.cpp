@@ -73,13 +73,13 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
         "{} expired, {} "
         "revoked, {} released, {} superseded, {} dropped, {} copied, {} reallocated; results: {} "
         "accepted ({} late) with {} rounds, "
-        "{} duplicate, {} stale, {} unknown",
+        "{} duplicate, {} stale, {} forgotten",
         count, all.events, all.messages, to_seconds(all.virtual_time), all.lost, all.doubled, all.damaged,
         all.parted, all.unreachable, all.bad_messages, all.kills, all.freezes, all.partitions, all.hangs,
         all.stuck, all.drains, all.joins, all.pauses, all.restarts, all.new_states, all.deaths, all.bans,
         all.failures, all.refused_bits, all.marked_images, all.lies, all.audited, all.unmasked, all.undone,
         all.relay_faults, all.relayed, c.granted, c.expired, c.revoked, c.released, c.superseded, c.dropped,
-        c.copied, c.reallocated, c.accepted, c.late, c.rounds_accepted, c.duplicates, c.stale, c.unknown));
+        c.copied, c.reallocated, c.accepted, c.late, c.rounds_accepted, c.duplicates, c.stale, c.forgotten));
     if (count < 2000) return;
     CHECK(c.rounds_accepted > c.accepted + c.accepted / 20);  // Leases of several rounds are no exception.
     CHECK(all.most_leases > 2 * k_least_credits);  // Wires are slow at times, and rounds are short.
@@ -91,7 +91,7 @@ TEST_CASE("whatever the network does and whoever dies, every sample is in the pi
           all.deaths,     all.bans,         all.failures,     all.lies,          all.audited,  all.unmasked,
           all.undone,     all.relay_faults, all.relayed,      c.expired,         c.revoked,    c.released,
           c.superseded,   c.dropped,        c.copied,         c.reallocated,     c.late,       c.duplicates,
-          c.stale,        c.unknown})
+          c.stale,        c.forgotten})
         CHECK(happened >= 5);
 }
 
