@@ -158,12 +158,12 @@ void ClientMachine::lose(const std::string& instance, PeerCause cause, std::stri
     Server& server = found->second;
     const ServerId id = server.peer.id();
     step_peer(server, cause, why);
-    const std::size_t open = indirect_.outstanding(id);
+    const std::size_t held = indirect_.outstanding(id);
     revoke(id);
     if (cause == PeerCause::lost) store_.count(Counter::died, 1, id);
-    log_note(fmt::format("{} {}: {} {} round{} of it go{} to others.", server.name,
-                         cause == PeerCause::lost ? "is lost" : "left", why, open, open == 1 ? "" : "s",
-                         open == 1 ? "es" : ""));
+    log_note(fmt::format("{} {}: {} {} lease{} of it go{} to others.", server.name,
+                         cause == PeerCause::lost ? "is lost" : "left", why, held, held == 1 ? "" : "s",
+                         held == 1 ? "es" : ""));
     std::erase(asking_, &server);
     server_by_id_.erase(id);
     if (const ServerId ids[]{id}; gave_indirect_.units_of(ids).empty() && !audit_.disputes(id))
