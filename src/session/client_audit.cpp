@@ -139,7 +139,6 @@ std::size_t ClientMachine::undo(const std::vector<std::uint32_t>& units) {
         });
     }
     store_.count(Counter::rounds_undone, undone);
-    last_undone_ = work_.indirect_ledger().new_lease_id();
     servers_changed();
     return undone;
 }

@@ -45,9 +45,8 @@ void ClientMachine::on(Server& server, message::Tile& tile) {
     const bool audits = audit_.holds(claim);
     if (const Verdict verdict = indirect_.judge(claim); !audits && verdict != Verdict::accepted) {
         indirect_.commit_indirect(claim, {}, {}, 0, now_);
-        // Of rounds that were undone, results were on their way.
-        const bool never_granted =
-            (verdict == Verdict::unknown || verdict == Verdict::mismatched) && tile.lease > last_undone_;
+        // Results may come late: of rounds that are committed, forgotten or undone, or of an epoch before.
+        const bool never_granted = verdict == Verdict::unknown || verdict == Verdict::mismatched;
         return never_granted ? offend(server.who, Offence::unknown_lease) : void();
     }
     const PixelRect rect = audits ? work_.rect_of(tile.unit) : indirect_.rect_of(claim);

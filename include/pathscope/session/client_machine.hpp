@@ -315,7 +315,6 @@ class ClientMachine {
     Audit audit_;
     Contributions gave_direct_, gave_indirect_;  ///< In this epoch, if audits are asked for.
     std::map<ServerId, Author> authors_;         ///< Those that live, or gave something in this epoch.
-    LeaseId last_undone_{};                      ///< Rounds of leases up to it may have been undone.
     FrameWork work_;
     IndirectWork& indirect_;  ///< What servers are given: work_, or what is relayed.
     bool relays_;
