@@ -39,20 +39,28 @@ RenderState small_state() {
     return state;
 }
 
+/// A server that hears what the test says.
+struct StagedServer {
+    TemporaryFolder folder{};
+    StoppableWorld world{};
+    ServerMachine server{{"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world};
+    TimeNs now = k_second_ns;
+
+    void say(Message message) {
+        const Channel channel = k_message_table[message.index()].channel;
+        server.on_message(encode(std::move(message)), channel, now);
+        server.on_timers(now);
+    }
+};
+
 }  // namespace
 
 TEST_CASE("a client that grants without end and takes no answer does not fill the server's memory") {
     constexpr std::uint64_t k_session = 77;
     constexpr std::uint32_t k_credits = 2;
-    const TemporaryFolder folder;
-    StoppableWorld world;
-    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
-    TimeNs now = k_second_ns;
-    const auto say = [&](Message message) {
-        const Channel channel = k_message_table[message.index()].channel;
-        server.on_message(encode(std::move(message)), channel, now);
-        server.on_timers(now);
-    };
+    StagedServer stage;
+    auto& [folder, world, server, now] = stage;
+    const auto say = [&](Message message) { stage.say(std::move(message)); };
 
     // It joins: welcome, manifest, scene.
     const std::string packed = pack(PackValue(encode_state(small_state())));
@@ -102,15 +110,9 @@ TEST_CASE("a client that grants without end and takes no answer does not fill th
 }
 
 TEST_CASE("a banned server leaves at once, is silent until the ban's end, and then says HELLO") {
-    const TemporaryFolder folder;
-    StoppableWorld world;
-    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
-    TimeNs now = k_second_ns;
-    const auto say = [&](Message message) {
-        const Channel channel = k_message_table[message.index()].channel;
-        server.on_message(encode(std::move(message)), channel, now);
-        server.on_timers(now);
-    };
+    StagedServer stage;
+    auto& [folder, world, server, now] = stage;
+    const auto say = [&](Message message) { stage.say(std::move(message)); };
     const auto says_hello = [&] {
         world.sent.clear();
         server.on_timers(now);
@@ -146,15 +148,9 @@ TEST_CASE("a banned server leaves at once, is silent until the ban's end, and th
 
 TEST_CASE("a scene that is loaded late does not replace the one that the client went back to") {
     constexpr std::uint64_t k_session = 77;
-    const TemporaryFolder folder;
-    StoppableWorld world;
-    ServerMachine server({"server", "0", {"build", {}}, 1, 7, "client"}, SceneCache(folder.path()), world);
-    TimeNs now = k_second_ns;
-    const auto say = [&](Message message) {
-        const Channel channel = k_message_table[message.index()].channel;
-        server.on_message(encode(std::move(message)), channel, now);
-        server.on_timers(now);
-    };
+    StagedServer stage;
+    auto& [folder, world, server, now] = stage;
+    const auto say = [&](Message message) { stage.say(std::move(message)); };
     const auto render = [&](std::uint64_t number, Epoch epoch) {
         message::Lease lease;
         lease.session = k_session;
