@@ -28,6 +28,10 @@ void Turnaround::add(TimeNs since_grant) {
     mean_ns_ += (mean_ns_ > 0 ? k_weight_of_newest : 1) * (double(since_grant) - mean_ns_);
 }
 
+TimeNs Turnaround::when_idle(TimeNs render_time, std::size_t in_turn) const {
+    return std::max(render_time, mean() - TimeNs(in_turn - 1) * render_time);
+}
+
 TimeNs lease_duration(std::optional<TimeNs> predicted, std::uint32_t attempts) {
     TimeNs duration = k_longest_usual;
     if (predicted) {

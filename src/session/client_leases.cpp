@@ -139,14 +139,11 @@ bool ClientMachine::grant_to(Server& server) {
 }
 
 std::optional<Lease> ClientMachine::grant_straggler(Server& server) {
-    // Of its turnaround, the leases in front took their time; what is left is this one's, the wire's and this client's own, which
-    // an idle server does not save.
     const std::size_t window = window_of(server);
     const std::size_t in_turn = window > server.at_once ? window - server.at_once + 1 : 1;
     const auto own = [&](double samples) {
         auto estimate = server.speed.predict(samples);
-        if (estimate)
-            *estimate = std::max(*estimate, server.turnaround.mean() - TimeNs(in_turn - 1) * *estimate);
+        if (estimate) *estimate = server.turnaround.when_idle(*estimate, in_turn);
         return estimate;
     };
     const auto duration = [&](const Round& round, std::uint32_t) {

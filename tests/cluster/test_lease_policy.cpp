@@ -56,3 +56,13 @@ TEST_CASE("a turnaround is a mean that forgets by a quarter each time") {
     turnaround.add(0);
     CHECK(turnaround.mean() == 525);
 }
+
+TEST_CASE("an idle server saves the leases in front, but neither the wire nor the client's own delays") {
+    Turnaround turnaround;
+    CHECK(turnaround.when_idle(10, 3) == 10);  // Not measured.
+    turnaround.add(100);
+    CHECK(turnaround.when_idle(10, 1) == 100);
+    CHECK(turnaround.when_idle(10, 3) == 80);   // 20 of it for the two in front.
+    CHECK(turnaround.when_idle(0, 64) == 100);  // Nothing but delays.
+    CHECK(turnaround.when_idle(40, 3) == 40);   // Never less than rendering takes.
+}
