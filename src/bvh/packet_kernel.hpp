@@ -19,7 +19,7 @@ template <bool ordered, class Found, class Done>
     const PacketBounds bounds(rays);
     const float reach = bounds.reach(bvh.bounds);
     if (!suits_packet(rays, bounds, reach)) return false;
-    const PacketBoxRays box_rays(rays, bounds, reach * 0x1p-48f);
+    const PacketBoxRays box_rays(rays, bounds, reach * k_box_widening);
     const PacketLines lines(rays, bounds);
     const PacketTriangleRays triangle_rays(rays);
     float t_max = rays.farthest();

@@ -50,9 +50,11 @@ struct PacketLines {
 
 /// The triangles' part of it, for the eight of a block.
 ///
-/// margin: by how much an estimate in floats may be wrong. With |coordinates| of the corners up to R, of the origins up to
-/// O, both from the centre, of the directions up to D, and u = 2^-24, the roundings of all steps add up to
-/// u D R (58 R + 108 O), but for terms of u². Products so small that they lose digits add less than 2^-100: each is off by
+/// margin: by how much the estimate may differ from what the test itself finds. With |coordinates| of the corners up to R, of
+/// the origins up to O, both from the centre, of the directions up to D, and u = 2^-24, the roundings of all steps of the
+/// estimate add up to u D R (58 R + 108 O), but for terms of u². The test (geometry/triangle.hpp), times d.z, has coordinates
+/// up to 2 M that are off by 5 u M, M = R + O: two products of them are off by 2 (2 * 2 * 5 + 4) u M² D. Together that is
+/// less than 128 u M² D. Products so small that they lose digits add less than 2^-100: each is off by
 /// 2^-149 at most, and is multiplied by numbers below k_most_steep and k_most_reach.
 struct BlockEdges {
     using Row = std::array<float, k_wide>;
@@ -76,8 +78,8 @@ struct BlockEdges {
                 if (!lines.one_origin) store(difference[i][axis].data(), p[axis] - q[axis]);
             }
         }
-        const Float8 most = size * broadcast(64.0f) + broadcast(128 * lines.farthest_origin);
-        store(margin.data(), most * size * broadcast(0x1p-24f * lines.steepest) + broadcast(0x1p-100f));
+        const Float8 most = size + broadcast(lines.farthest_origin);
+        store(margin.data(), most * most * broadcast(128 * 0x1p-24f * lines.steepest) + broadcast(0x1p-100f));
     }
 
     /// Of the group of rays, those that may meet the triangle in this lane.
@@ -104,7 +106,7 @@ struct BlockEdges {
 
 /// The rows of TriangleRay.
 struct PacketTriangleRays {
-    using Row = std::array<double, k_packet_rays>;
+    using Row = PacketRays::Row;
     alignas(64) Row origin_x, origin_y, origin_z, shear_x, shear_y, inverse_z;
     /// Of each eight rays, those whose longest axis is x, or y; that of the others is z.
     std::array<Lanes, k_packet_rays / k_wide> longest_x, longest_y;
@@ -118,12 +120,12 @@ struct PacketTriangleRays {
             longest_x[i / k_wide] = at_most(y, x) & at_most(z, x);
             longest_y[i / k_wide] = ~longest_x[i / k_wide] & at_most(z, y) & k_all_wide;
             const auto along = [&](std::size_t which, const std::array<PacketRays::Row, 3>& rows) {
-                return widen(permuted(which, i, row(rows[0]), row(rows[1]), row(rows[2])));
+                return permuted(which, i, row(rows[0]), row(rows[1]), row(rows[2]));
             };
-            const Double8 inverse = broadcast(1.0) / along(2, rays.direction);
-            store(inverse_z.data() + i, inverse);
-            store(shear_x.data() + i, along(0, rays.direction) * inverse);
-            store(shear_y.data() + i, along(1, rays.direction) * inverse);
+            const Float8 zero = broadcast(0.0f), d_z = along(2, rays.direction);
+            store(inverse_z.data() + i, broadcast(1.0f) / d_z);
+            store(shear_x.data() + i, (zero - along(0, rays.direction)) / d_z);
+            store(shear_y.data() + i, (zero - along(1, rays.direction)) / d_z);
             store(origin_x.data() + i, along(0, rays.origin));
             store(origin_y.data() + i, along(1, rays.origin));
             store(origin_z.data() + i, along(2, rays.origin));
@@ -148,16 +150,16 @@ struct PacketTriangleRays {
                                           const PacketTriangleRays& rays, std::size_t first,
                                           BlockHits& hits) {
     const auto row = [&](const PacketTriangleRays::Row& numbers) { return load(numbers.data() + first); };
-    const Double8 shear_x = row(rays.shear_x), shear_y = row(rays.shear_y);
+    const Float8 shear_x = row(rays.shear_x), shear_y = row(rays.shear_y);
     const auto shear = [&](std::size_t corner) {
         const auto& axes = block.corners[corner];
         const Float8 a = broadcast(axes[0][lane]), b = broadcast(axes[1][lane]), c = broadcast(axes[2][lane]);
         const auto from_origin = [&](std::size_t which, const PacketTriangleRays::Row& origin) {
-            return widen(rays.permuted(which, first, a, b, c)) - row(origin);
+            return rays.permuted(which, first, a, b, c) - row(origin);
         };
-        const Double8 z = from_origin(2, rays.origin_z);
-        return ShearedCorners{from_origin(0, rays.origin_x) - shear_x * z,
-                              from_origin(1, rays.origin_y) - shear_y * z, z};
+        const Float8 z = from_origin(2, rays.origin_z);
+        return ShearedCorners{fused(shear_x, z, from_origin(0, rays.origin_x)),
+                              fused(shear_y, z, from_origin(1, rays.origin_y)), z};
     };
     return intersect_sheared(shear(0), shear(1), shear(2), row(rays.inverse_z),
                              load(rays.rays.t_min.data() + first), load(rays.rays.t_max.data() + first),

@@ -18,8 +18,8 @@ inline namespace PATHSCOPE_SIMD {
 ///     (plane - o) / d  =  plane / d  +  offset,      offset = -o / d
 ///
 /// The rounding of the offset moves o by another half ulp of its own, of the four that BoxRay has moved it. But infinity
-/// minus infinity is no number, and would meet every box; so 1/d ends at 2^52 times that of the longest axis. BoxRay moves o
-/// by 2^-48 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
+/// minus infinity is no number, and would meet every box; so 1/d ends at 2^24 times that of the longest axis. BoxRay moves o
+/// by 2^-20 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
 struct WideBoxRay {
     struct Slab {
         Float8 near_offset, far_offset, inverse;
@@ -33,7 +33,7 @@ struct WideBoxRay {
 
   private:
     static Slab slab(const BoxRay& ray, int axis, SlabPlanes planes) {
-        const float most = 0x1p52f * min_component(abs(ray.inverse));
+        const float most = 0x1p24f * min_component(abs(ray.inverse));
         const float inverse = std::max(std::min(ray.inverse[axis], most), -most);
         return {broadcast(-ray.near_origin[axis] * inverse), broadcast(-ray.far_origin[axis] * inverse),
                 broadcast(inverse), planes.near * k_wide, planes.far * k_wide};
@@ -57,18 +57,9 @@ struct WideBoxRay {
 
 // ---- Eight triangles.
 
-/// a b - c d with the exact sign, as difference_of_products() of geometry/triangle.hpp.
-[[nodiscard]] inline Double8 difference_of_products(Double8 a, Double8 b, Double8 c, Double8 d) {
-    const Double8 ab = a * b, cd = c * d;
-    const Lanes cancel = equal(ab, cd);
-    if (!any(cancel)) [[likely]]
-        return ab - cd;
-    return select(cancel, fused_multiply_subtract(a, b, ab) - fused_multiply_subtract(c, d, cd), ab - cd);
-}
-
 /// Corners as seen along the ray: sheared x and y, and the distance along z.
 struct ShearedCorners {
-    Double8 x, y, z;
+    Float8 x, y, z;
 };
 
 struct BlockHits {
@@ -78,37 +69,38 @@ struct BlockHits {
 /// As intersect_proper_triangle(), step by step and bit by bit, for eight pairs of a ray and a triangle. Returns those that
 /// meet; `hits` is written if there are any, and means something in those lanes only.
 [[nodiscard]] inline Lanes intersect_sheared(const ShearedCorners& a, const ShearedCorners& b,
-                                             const ShearedCorners& c, Double8 inverse_z, Float8 t_min,
+                                             const ShearedCorners& c, Float8 inverse_z, Float8 t_min,
                                              Float8 t_max, BlockHits& hits) {
-    const Double8 u = difference_of_products(c.x, b.y, c.y, b.x);
-    const Double8 v = difference_of_products(a.x, c.y, a.y, c.x);
-    const Double8 w = difference_of_products(b.x, a.y, b.y, a.x);
-    const Double8 zero = broadcast(0.0);
+    const Float8 u = c.x * b.y - c.y * b.x;
+    const Float8 v = a.x * c.y - a.y * c.x;
+    const Float8 w = b.x * a.y - b.y * a.x;
+    const Float8 zero = broadcast(0.0f);
     const Lanes inside = at_most(zero, min(u, min(v, w))) | at_most(max(u, max(v, w)), zero);
     if (!any(inside)) return 0;
 
-    const Double8 sum = u + v + w;
-    const Double8 inverse_sum = broadcast(1.0) / sum;  // Infinite where the triangle is seen edge-on.
-    const Float8 t = narrow((u * a.z + v * b.z + w * c.z) * inverse_sum * inverse_z);
-    const Lanes hit = inside & ~equal(sum, zero) & at_most(t_min, t) & at_most(t, t_max);
+    const Float8 inverse_sum = broadcast(1.0f) / (u + v + w);  // Infinite where the triangle is seen edge-on.
+    const Float8 weight_b = v * inverse_sum, weight_c = w * inverse_sum;
+    const Float8 t = (u * inverse_sum * a.z + weight_b * b.z + weight_c * c.z) * inverse_z;
+    const Lanes hit = inside & at_most(t_min, t) & at_most(t, t_max);
     if (!any(hit)) return 0;
     store(hits.t.data(), t);
-    store(hits.u.data(), narrow(v * inverse_sum));
-    store(hits.v.data(), narrow(w * inverse_sum));
+    store(hits.u.data(), weight_b);
+    store(hits.v.data(), weight_c);
     return hit;
 }
 
 /// The eight triangles of a block and one ray.
 [[nodiscard]] inline Lanes intersect_triangles(const TriangleBlock& block, const TriangleRay& ray,
                                                float t_max, BlockHits& hits) {
+    const Float8 shear_x = broadcast(ray.shear_x), shear_y = broadcast(ray.shear_y);
+    const Float8 origin_x = broadcast(ray.origin_x), origin_y = broadcast(ray.origin_y),
+                 origin_z = broadcast(ray.origin_z);
     const auto shear = [&](std::size_t corner) {
         const auto& axes = block.corners[corner];
-        const auto from_origin = [&](int axis, double origin) {
-            return widen(load(axes[static_cast<std::size_t>(axis)].data())) - broadcast(origin);
-        };
-        const Double8 z = from_origin(ray.z, ray.origin_z);
-        return ShearedCorners{from_origin(ray.x, ray.origin_x) - broadcast(ray.shear_x) * z,
-                              from_origin(ray.y, ray.origin_y) - broadcast(ray.shear_y) * z, z};
+        const auto at = [&](int axis) { return load(axes[static_cast<std::size_t>(axis)].data()); };
+        const Float8 z = at(ray.z) - origin_z;
+        return ShearedCorners{fused(shear_x, z, at(ray.x) - origin_x),
+                              fused(shear_y, z, at(ray.y) - origin_y), z};
     };
     return intersect_sheared(shear(0), shear(1), shear(2), broadcast(ray.inverse_z), broadcast(ray.t_min),
                              broadcast(t_max), hits);

@@ -57,6 +57,13 @@ Box bounds(const Mesh& mesh) {
     return box;
 }
 
+float longest_side(const Mesh& mesh) {
+    float longest = 0;
+    for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i)
+        longest = std::max(longest, longest_side(corners(mesh, i)));
+    return longest;
+}
+
 Result<void> validate(const Mesh& mesh) {
     if (Result<void> lengths = check_lengths(mesh); !lengths) return lengths;
     if (Result<void> vertices = check_vertices(mesh); !vertices) return vertices;

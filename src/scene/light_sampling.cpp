@@ -82,7 +82,7 @@ std::optional<LightSample> sample(const Request& request, const TriangleLight& l
     SurfacePoint point;
     if (light.even) {
         point.position = exact_point(light.corners, weights.x, weights.y);
-        point.position_error = position_error(point.position, light.longest_side);
+        point.position_error = position_error(point.position, request.scene.mesh.longest_side);
         point.geometric_normal = light.normal;
     } else {
         point = surface_point(request.scene.mesh, {0, weights.x, weights.y, light.triangle});

@@ -253,6 +253,7 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBui
     }
     for (const Material& material : scene.materials) scene.has_cutouts |= bool(material.map_d);
 
+    scene.mesh.longest_side = longest_side(scene.mesh);
     scene.bounds = bounds(scene.mesh);
     for (const Sphere& sphere : scene.spheres) {
         const Vec3 half{sphere.radius, sphere.radius, sphere.radius};

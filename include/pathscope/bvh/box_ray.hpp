@@ -9,9 +9,9 @@
 ///
 /// - Rounding. Each t is off by three roundings, up to 3 * 2^-24 of itself: a ray through an edge of the box, or
 ///   along a face of a flat one, can fall between near and far. So far is stretched by 1 + 2^-21.
-/// - The triangle test (geometry/triangle.hpp) has an error of its own, about 2^-50 of the distances, by which a hit
-///   may stick out of its box. So the origin is moved, towards the near planes for t_near and away from the far ones
-///   for t_far, by 2^-48 of the scene and a few ulps of its own, lest the sum be rounded away.
+/// - The triangle test (geometry/triangle.hpp) has an error of its own, up to 9 * 2^-24 of the distances along an axis, by
+///   which a hit may stick out of its box. So the origin is moved, towards the near planes for t_near and away from the
+///   far ones for t_far, by 2^-20 of the scene and a few ulps of its own, lest the sum be rounded away.
 /// - Division by zero. A direction component of 0 has an infinite inverse, and 0 * infinity is NaN where the origin is
 ///   on a plane. The moved origin is not: where the origin is on the border of the slab, it is inside, and the products
 ///   are -infinity and +infinity.
@@ -19,7 +19,7 @@
 /// Ensures: if intersect_triangle() reports a hit at t for a triangle inside the box, and t is in [t_min, t_max], then
 /// the box is met, with t_near <= t * (1 + 2^-21). This is what makes the closest hit independent of the tree.
 /// Thread safety: pure.   Source: Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2); the moved origin is
-/// that of Woop, Benthin, Wald 2013, with the error of a test in double.
+/// that of Woop, Benthin, Wald 2013.
 /// Test: tests/bvh/test_box_ray.cpp
 
 #include <algorithm>
@@ -33,6 +33,9 @@
 namespace pathscope {
 
 inline constexpr float k_far_stretch = 1 + 0x1p-21f;
+
+/// By how much boxes are widened, as a share of the scene's reach from the ray's origin.
+inline constexpr float k_box_widening = 0x1p-20f;
 
 /// Where the planes of one axis lie in BvhNode::bounds, as seen by the ray.
 struct SlabPlanes {
@@ -48,7 +51,7 @@ struct BoxRay {
     BoxRay(const Ray& ray, const Box& scene)
         : x(planes(ray.direction, 0)), y(planes(ray.direction, 1)), z(planes(ray.direction, 2)) {
         const Vec3 reach = max(abs(scene.low - ray.origin), abs(scene.high - ray.origin));
-        const float error = 0x1p-48f * max_component(reach);
+        const float error = k_box_widening * max_component(reach);
         for (int axis = 0; axis < 3; ++axis) {
             const float shift =
                 std::copysign(std::abs(ray.origin[axis]) * 0x1p-22f + error, ray.direction[axis]);

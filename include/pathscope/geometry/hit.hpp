@@ -5,11 +5,15 @@
 /// the distance, while the weighted mean of the corners is off by its own rounding only:
 ///
 ///     p = (1 - u - v) a + u b + v c      in double, rounded once to float
-///     |p - exact|_i <= 2^-24 |p_i| + 2^-32 R,    R = longest side of the triangle's box
+///     |p - exact|_i <= 2^-24 |p_i|
 ///
-/// The first term is half a unit in the last place. The second stands for all errors in double (a few times 2^-52 R),
-/// and leaves room for coplanar triangles that overlap this one and are up to 2^16 times larger: a decal on a floor
-/// at height zero, where the first term vanishes.
+/// half a unit in the last place. A ray that leaves it has to keep clear of more than that: the triangle test takes the
+/// surface, and all others in the same plane, to be up to 11.5 * 2^-24 R away from where they are, R = the longest side of a
+/// triangle (geometry/triangle.hpp). So
+///
+///     position_error_i = 2^-24 |p_i| + 2^-22 R,    R = longest side in the mesh, if that was measured, else of the triangle
+///
+/// of which spawn.hpp takes four. Of the mesh, because a poster hangs on a wall that is a hundred times larger.
 ///
 /// The two normals. Winding in files is not to be trusted, vertex normals are: where vertex normals are given, the
 /// geometric normal is the one of the two that lies on their side; elsewhere it follows the winding. So
@@ -37,7 +41,8 @@ struct Hit {
 
 struct SurfacePoint {
     Vec3 position;
-    Vec3 position_error;    ///< Per component: the surface is not farther from `position` than this.
+    Vec3
+        position_error;  ///< Per component: how far from `position` rays may take the surface to be, divided by 4.
     Vec3 geometric_normal;  ///< Of the plane of the triangle.
     Vec3 shading_normal;    ///< Interpolated between the vertices; the geometric one where they have none.
     Vec2 uv;                ///< Texture coordinates; (0, 0) if the mesh has none.
@@ -57,14 +62,10 @@ struct SurfacePoint {
     return to_float((1 - u - v) * to_double(t.a) + u * to_double(t.b) + v * to_double(t.c));
 }
 
-/// The bound for such a point. Requires: longest_side of the triangle's box.
+/// position_error of such a point. Requires: the longest side of any triangle near.
 [[nodiscard]] inline Vec3 position_error(Vec3 position, float longest_side) {
-    const float rounding_in_double = 0x1p-32f * longest_side;
-    return abs(position) * 0x1p-24f + Vec3{rounding_in_double, rounding_in_double, rounding_in_double};
-}
-
-[[nodiscard]] inline float longest_side(const TriangleCorners& t) {
-    return max_component(max(max(t.a, t.b), t.c) - min(min(t.a, t.b), t.c));
+    const float of_test = 0x1p-22f * longest_side;
+    return abs(position) * 0x1p-24f + Vec3{of_test, of_test, of_test};
 }
 
 /// Fills in both normals where the mesh has normals at its vertices; geometric_normal is that of the winding before.
@@ -92,7 +93,8 @@ inline void interpolate_normals(const Mesh& mesh, const Hit& hit, SurfacePoint& 
     point.triangle = hit.triangle;
     point.material = mesh.material_of(hit.triangle);
     point.position = exact_point(triangle, hit.u, hit.v);
-    point.position_error = position_error(point.position, longest_side(triangle));
+    const float longest = mesh.longest_side > 0 ? mesh.longest_side : longest_side(triangle);
+    point.position_error = position_error(point.position, longest);
     point.uv = interpolate_uv(mesh, hit.triangle, hit.u, hit.v);
     point.geometric_normal = point.shading_normal = geometric_normal(triangle);
     if (!mesh.normals.empty()) interpolate_normals(mesh, hit, point);

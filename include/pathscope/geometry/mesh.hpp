@@ -36,6 +36,7 @@ struct Mesh {
     std::vector<Vec2> uvs;      ///< Empty or per vertex.
     std::vector<TriangleIndices> triangles;
     std::vector<std::uint32_t> materials;  ///< Empty (all 0) or per triangle.
+    float longest_side = 0;  ///< Of the triangles' boxes, as longest_side(mesh) finds it; 0 = not measured.
 
     [[nodiscard]] std::uint32_t triangle_count() const {
         return static_cast<std::uint32_t>(triangles.size());
@@ -92,6 +93,13 @@ struct TriangleCorners {
     box.add(triangle.c);
     return box;
 }
+
+[[nodiscard]] inline float longest_side(const TriangleCorners& t) {
+    return max_component(max(max(t.a, t.b), t.c) - min(min(t.a, t.b), t.c));
+}
+
+/// The largest of all triangles: so far can the triangle test be off (geometry/spawn.hpp).
+[[nodiscard]] float longest_side(const Mesh& mesh);
 
 /// Of all triangles; positions that no triangle uses do not count.
 [[nodiscard]] Box bounds(const Mesh& mesh);

@@ -1,20 +1,20 @@
 #pragma once
 /// Rays that leave a surface without hitting it again.
 ///
-/// A stored position lies within its error box e around the true point, on either side of the surface. Along the
-/// geometric normal n the box reaches D = sum_i |n_i| e_i, so the origin is moved by
+/// The triangle test finds the surface within four error boxes e around a stored position (hit.hpp), on either side. Along the
+/// geometric normal n a box reaches D = sum_i |n_i| e_i, so the origin is moved by
 ///
-///     k D,   k = 4:   one D for the position, one for rounding the moved origin to float,
-///                     two to spare, against the 2^-50 or so by which the triangle test errs
+///     k D,   k = 4:   of the position's 2^-24, one D for itself, one for rounding the moved origin to float, two to spare;
+///                     of the test's 2^-22 R, 16 * 2^-24 R, where 11.5 are needed
 ///
-/// to the side that the direction points to. This is an offset of a few units in the last place at any scale of scene
-/// and any distance from the origin of space: no epsilon to tune, no t_min. The same margin clears coincident
-/// copies of the triangle: they lie in the same plane. Use the geometric normal, never the shading
+/// to the side that the direction points to. This is an offset of a few units in the last place of the largest coordinates at
+/// any scale of scene and any distance from the origin of space: no epsilon to tune, no t_min. The same margin clears
+/// all triangles in the same plane. Use the geometric normal, never the shading
 /// normal: only the former knows where the surface is.
 ///
 /// A shadow ray has two ends to keep clear. It ends at the target moved off the light's surface in the same way, by an
-/// error to which 2^-22 of the distance is added: that far can the rounding of direction and length carry the
-/// end of the ray.
+/// error to which 5 * 2^-24 of the distance L is added, four times: from so far away the triangle test is off by 11.5 * 2^-24 L, and
+/// the rounding of direction and length carry the end of the ray by some more.
 ///
 /// Ensures: direction of length one. Thread safety: pure.
 /// Reference: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., section 6.8.6.
@@ -55,8 +55,9 @@ struct RayTarget {
     const Vec3 between = target.position - point.position;
     const Vec3 origin = offset_origin(point.position, point.position_error, point.geometric_normal, between);
 
-    // At the far end the ray has drifted by the rounding of its direction and length, a share of the distance.
-    const Vec3 target_error = target.position_error + abs(between) * 0x1p-22f;
+    // At the far end the test and the ray's drift err by a share of the distance.
+    const float from_afar = 5 * 0x1p-24f * max_component(abs(between));
+    const Vec3 target_error = target.position_error + Vec3{from_afar, from_afar, from_afar};
     const Vec3 end = offset_origin(target.position, target_error, target.normal, -between);
 
     const Vec3 segment = end - origin;

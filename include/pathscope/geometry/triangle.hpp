@@ -13,23 +13,30 @@
 /// and then U, V, W are the weights of a, b, c, up to their sum.
 ///
 /// Why no light leaks along a shared edge: A' depends on the vertex and the ray only, so neighbours see the same
-/// 2D points; W of one is -W of the other, bit for bit; and its sign is exact: if two products differ after
-/// rounding, then they differ that way before it, and if they do not, their rounding errors are compared. So the ray
-/// is never outside of both. A ray through an edge hits both neighbours (see traverse.hpp for which one counts).
+/// 2D points; W of one is -W of the other, bit for bit; and rounding keeps order: where two rounded products differ, they
+/// differ that way before it. Where they do not, the difference is zero, the edge counts as met, and both neighbours claim the
+/// ray. So it is never outside of both (see traverse.hpp for which one counts).
 ///
-/// Why double: the hit is exact but for about 2^-50 of the triangle's size, so that origins need to be moved off the
-/// surface only by the rounding of the stored position (spawn.hpp), be the triangle ever so large. A
-/// float version would see the triangle displaced by 6 * 2^-24 of its size.
+/// All in floats, because eight of them fit where four doubles do. With u = 2^-24, M the largest |coordinate| of the corners
+/// as seen from the ray's origin, and weights that are not negative and add up to one: the point of the triangle that has
+/// these weights lies within
 ///
-/// Ensures: degenerate triangles and triangles seen exactly edge-on are never hit. No absolute epsilon.
+///     5 u M along x and y    (of A': origin 1, z 1, shear 1, product and sum 2)
+///     9 u M along z          (of t d.z: weights 4, products and sums 3, origin 1, 1/d.z 1)
+///
+/// of the point of the ray at t. A triangle that a ray leaves can thus be met again up to 11.5 u M above it: spawn.hpp moves
+/// origins farther than that, and box_ray.hpp widens boxes by more.
+///
+/// Ensures: degenerate triangles and triangles seen exactly edge-on are never hit. No absolute epsilon; scenes may be of
+/// any size from 2^-40 to 2^40, where no product of four lengths leaves the range of floats.
 /// Thread safety: pure.   Source: Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1).
 /// Test: tests/geometry/test_triangle.cpp
 
 #include <array>
 #include <optional>
 
-#include "pathscope/geometry/double_vec.hpp"
 #include "pathscope/geometry/mesh.hpp"
+#include "pathscope/math/fused.hpp"
 #include "pathscope/math/ray.hpp"
 
 namespace pathscope {
@@ -41,9 +48,9 @@ using Corner = std::array<float, 3>;
 
 /// What the test needs of a ray, made once per ray: its origin and shear in permuted axes.
 struct TriangleRay {
-    int x, y, z;                          ///< Axes; z is that of the longest direction component.
-    double origin_x, origin_y, origin_z;  ///< Permuted.
-    double shear_x, shear_y, inverse_z;   ///< d.x/d.z, d.y/d.z, 1/d.z
+    int x, y, z;                         ///< Axes; z is that of the longest direction component.
+    float origin_x, origin_y, origin_z;  ///< Permuted.
+    float shear_x, shear_y, inverse_z;   ///< -d.x/d.z, -d.y/d.z, 1/d.z
     float t_min;
 
     explicit TriangleRay(const Ray& ray);
@@ -81,36 +88,37 @@ inline TriangleRay::TriangleRay(const Ray& ray) : t_min(ray.t_min) {
     origin_x = ray.origin[x];
     origin_y = ray.origin[y];
     origin_z = ray.origin[z];
-    inverse_z = 1.0 / ray.direction[z];
-    shear_x = ray.direction[x] * inverse_z;
-    shear_y = ray.direction[y] * inverse_z;
+    inverse_z = 1 / ray.direction[z];
+    shear_x = -ray.direction[x] / ray.direction[z];
+    shear_y = -ray.direction[y] / ray.direction[z];
 }
 
 inline std::optional<TriangleHit> intersect_proper_triangle(const TriangleRay& ray, const Corner& a,
                                                             const Corner& b, const Corner& c, float t_max) {
-    const double a_z = a[ray.z] - ray.origin_z;
-    const double b_z = b[ray.z] - ray.origin_z;
-    const double c_z = c[ray.z] - ray.origin_z;
-    const double a_x = a[ray.x] - ray.origin_x - ray.shear_x * a_z;
-    const double a_y = a[ray.y] - ray.origin_y - ray.shear_y * a_z;
-    const double b_x = b[ray.x] - ray.origin_x - ray.shear_x * b_z;
-    const double b_y = b[ray.y] - ray.origin_y - ray.shear_y * b_z;
-    const double c_x = c[ray.x] - ray.origin_x - ray.shear_x * c_z;
-    const double c_y = c[ray.y] - ray.origin_y - ray.shear_y * c_z;
+    const float a_z = a[ray.z] - ray.origin_z;
+    const float b_z = b[ray.z] - ray.origin_z;
+    const float c_z = c[ray.z] - ray.origin_z;
+    const float a_x = fused_multiply_add(ray.shear_x, a_z, a[ray.x] - ray.origin_x);
+    const float a_y = fused_multiply_add(ray.shear_y, a_z, a[ray.y] - ray.origin_y);
+    const float b_x = fused_multiply_add(ray.shear_x, b_z, b[ray.x] - ray.origin_x);
+    const float b_y = fused_multiply_add(ray.shear_y, b_z, b[ray.y] - ray.origin_y);
+    const float c_x = fused_multiply_add(ray.shear_x, c_z, c[ray.x] - ray.origin_x);
+    const float c_y = fused_multiply_add(ray.shear_y, c_z, c[ray.y] - ray.origin_y);
 
     // A zero is on the edge, and belongs to both sides.
-    const double u = difference_of_products(c_x, b_y, c_y, b_x);
-    const double v = difference_of_products(a_x, c_y, a_y, c_x);
-    const double w = difference_of_products(b_x, a_y, b_y, a_x);
-    if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return std::nullopt;
+    const float u = c_x * b_y - c_y * b_x;
+    const float v = a_x * c_y - a_y * c_x;
+    const float w = b_x * a_y - b_y * a_x;
+    if (!(u >= 0 && v >= 0 && w >= 0) && !(u <= 0 && v <= 0 && w <= 0)) return std::nullopt;
 
     // All of one sign: the sum is zero only if all are, and then the triangle is seen edge-on.
-    const double sum = u + v + w;
+    const float sum = u + v + w;
     if (sum == 0) return std::nullopt;
-    const double inverse_sum = 1.0 / sum;
-    const auto t = static_cast<float>((u * a_z + v * b_z + w * c_z) * inverse_sum * ray.inverse_z);
+    const float inverse_sum = 1 / sum;
+    const float weight_b = v * inverse_sum, weight_c = w * inverse_sum;
+    const float t = (u * inverse_sum * a_z + weight_b * b_z + weight_c * c_z) * ray.inverse_z;
     if (!(t >= ray.t_min && t <= t_max)) return std::nullopt;
-    return TriangleHit{t, static_cast<float>(v * inverse_sum), static_cast<float>(w * inverse_sum)};
+    return TriangleHit{t, weight_b, weight_c};
 }
 
 inline std::optional<TriangleHit> intersect_triangle(const TriangleRay& ray, const Corner& a, const Corner& b,

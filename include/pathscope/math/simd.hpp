@@ -1,5 +1,5 @@
 #pragma once
-/// Eight floats or doubles at once, four floats, and as many floats as fit: with its parts in math/simd, the only headers
+/// Eight or sixteen floats at once, four floats, and as many floats as fit: with its parts in math/simd, the only headers
 /// with intrinsics.
 ///
 ///     const Float8 t = (load(plane) - broadcast(origin)) * broadcast(inverse);
@@ -22,7 +22,6 @@
 /// every level, and is slow on a machine whose instructions have two (fused.hpp).
 /// Thread safety: pure.   Test: tests/math/test_simd.cpp
 
-#include "pathscope/math/simd/double8.hpp"
 #include "pathscope/math/simd/float16.hpp"
 #include "pathscope/math/simd/float4.hpp"
 #include "pathscope/math/simd/float8.hpp"

@@ -29,6 +29,10 @@ inline void store(float* sixteen, Float16 a) { _mm512_store_ps(sixteen, a.lanes)
 [[nodiscard]] inline Float16 about_multiply_add(Float16 a, Float16 b, Float16 c) {
     return {_mm512_fmadd_ps(a.lanes, b.lanes, c.lanes)};
 }
+/// a b + c, rounded once (fused.hpp).
+[[nodiscard]] inline Float16 fused(Float16 a, Float16 b, Float16 c) {
+    return {_mm512_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
 /// a where the lane is chosen, else b.
 [[nodiscard]] inline Float16 select(Lanes chosen, Float16 a, Float16 b) {
     return {_mm512_mask_blend_ps(static_cast<__mmask16>(chosen), b.lanes, a.lanes)};
@@ -59,6 +63,9 @@ inline void store(float* sixteen, Float16 a) {
 }
 [[nodiscard]] inline Float16 about_multiply_add(Float16 a, Float16 b, Float16 c) {
     return {about_multiply_add(a.low, b.low, c.low), about_multiply_add(a.high, b.high, c.high)};
+}
+[[nodiscard]] inline Float16 fused(Float16 a, Float16 b, Float16 c) {
+    return {fused(a.low, b.low, c.low), fused(a.high, b.high, c.high)};
 }
 [[nodiscard]] inline Float16 select(Lanes chosen, Float16 a, Float16 b) {
     return {select(chosen & 0xff, a.low, b.low), select(chosen >> 8, a.high, b.high)};

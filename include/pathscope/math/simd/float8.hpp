@@ -27,6 +27,10 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 [[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) {
     return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
 }
+/// a b + c, rounded once (fused.hpp).
+[[nodiscard]] inline Float8 fused(Float8 a, Float8 b, Float8 c) {
+    return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
 /// The smallest of the eight.
 [[nodiscard]] inline float least(Float8 a) {
     __m128 m = _mm_min_ps(_mm256_castps256_ps128(a.lanes), _mm256_extractf128_ps(a.lanes, 1));
@@ -104,6 +108,12 @@ inline void store(float* eight, Float8 a) {
     return lanewise::each(a, b, [](float x, float y) { return x > y ? x : y; });
 }
 [[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) { return a * b + c; }
+[[nodiscard]] inline Float8 fused(Float8 a, Float8 b, Float8 c) {
+    Float8 result;
+    for (std::size_t i = 0; i < 8; ++i)
+        result.lanes[i] = fused_multiply_add(a.lanes[i], b.lanes[i], c.lanes[i]);
+    return result;
+}
 [[nodiscard]] inline Float8 select(Lanes chosen, Float8 a, Float8 b) {
     Float8 result;
     for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = (chosen >> i & 1) != 0 ? a.lanes[i] : b.lanes[i];

@@ -18,10 +18,6 @@ using Floats = Float16;
 [[nodiscard]] inline Floats load_floats(const float* many) { return {_mm512_loadu_ps(many)}; }
 inline void store_floats(float* many, Floats a) { _mm512_storeu_ps(many, a.lanes); }
 [[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast16(a); }
-/// a b + c, rounded once (fused.hpp).
-[[nodiscard]] inline Floats fused(Floats a, Floats b, Floats c) {
-    return {_mm512_fmadd_ps(a.lanes, b.lanes, c.lanes)};
-}
 /// a 2^n, where n stands in the last bits of `n_below` as a whole number, as it does in 0x1.8p23f + n.
 /// Requires: the result is a normal number, or a is 1 and n is -127, which gives 0.
 [[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
@@ -36,9 +32,6 @@ using Floats = Float8;
 [[nodiscard]] inline Floats load_floats(const float* many) { return {_mm256_loadu_ps(many)}; }
 inline void store_floats(float* many, Floats a) { _mm256_storeu_ps(many, a.lanes); }
 [[nodiscard]] inline Floats broadcast_floats(float a) { return broadcast(a); }
-[[nodiscard]] inline Floats fused(Floats a, Floats b, Floats c) {
-    return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
-}
 [[nodiscard]] inline Floats times_power_of_two(Floats a, Floats n_below) {
     const __m256i exponent = _mm256_slli_epi32(_mm256_castps_si256(n_below.lanes), 23);
     return {_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a.lanes), exponent))};
