@@ -31,15 +31,15 @@ struct PacketBoxRays {
     /// Axis by axis; filled if test_each.
     alignas(64) std::array<PacketRays::Row, 3> near_origin, far_origin, inverse;
 
-    PacketBoxRays(const PacketRays& packet, const PacketBounds& bounds, float error)
-        : slabs{slab(bounds, error, 0), slab(bounds, error, 1), slab(bounds, error, 2)},
-          t_min(broadcast(bounds.t_min)),
-          test_each(!bounds.one_origin || bounds.spread() > k_most_spread || slabs[0].mixed ||
+    PacketBoxRays(const PacketRays& packet, float error)
+        : slabs{slab(packet, error, 0), slab(packet, error, 1), slab(packet, error, 2)},
+          t_min(broadcast(packet.least_t_min)),
+          test_each(!packet.one_origin || packet.spread() > k_most_spread || slabs[0].mixed ||
                     slabs[1].mixed || slabs[2].mixed),
           rays(packet) {
         if (!test_each) return;
         for (std::size_t axis = 0; axis < 3; ++axis)
-            each_group(rays.groups, [&](std::size_t i) {
+            for (std::size_t i = 0; i < rays.groups * k_group; i += k_group) {
                 const Float16 origin = load16(rays.origin[axis].data() + i);
                 const Float16 direction = load16(rays.direction[axis].data() + i);
                 const Float16 size = magnitude(origin) * broadcast16(0x1p-22f) + broadcast16(error);
@@ -47,15 +47,15 @@ struct PacketBoxRays {
                 store(near_origin[axis].data() + i, select(forward, origin + size, origin - size));
                 store(far_origin[axis].data() + i, select(forward, origin - size, origin + size));
                 store(inverse[axis].data() + i, broadcast16(1.0f) / direction);
-            });
+            }
     }
 
   private:
-    static Slab slab(const PacketBounds& bounds, float error, std::size_t axis) {
+    static Slab slab(const PacketRays& rays, float error, std::size_t axis) {
         const std::size_t low_plane = axis * k_wide, high_plane = low_plane + 3 * k_wide;
         // Where signs differ the interval of 1/d is infinite: any t is in the slab.
         constexpr float beyond = 0x1p100f;
-        if (bounds.mixed(axis))
+        if (rays.mixed(axis))
             return {broadcast(beyond),
                     broadcast(-beyond),
                     broadcast(1.0f),
@@ -63,15 +63,15 @@ struct PacketBoxRays {
                     low_plane,
                     high_plane,
                     true};
-        const bool backward = bounds.backward(axis);
+        const bool backward = rays.backward(axis);
         const auto moved = [&](float origin, float sign) {
             return origin + sign * (std::abs(origin) * 0x1p-22f + error);
         };
-        const auto [low, high] = bounds.origins[axis];
+        const auto [low, high] = rays.origins[axis];
         return {broadcast(backward ? moved(low, -1) : moved(high, 1)),
                 broadcast(backward ? moved(high, 1) : moved(low, -1)),
-                broadcast(1 / bounds.directions[axis].high),
-                broadcast(1 / bounds.directions[axis].low),
+                broadcast(1 / rays.directions[axis].high),
+                broadcast(1 / rays.directions[axis].low),
                 backward ? high_plane : low_plane,
                 backward ? low_plane : high_plane,
                 false};

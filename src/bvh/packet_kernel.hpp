@@ -16,16 +16,15 @@ inline namespace PATHSCOPE_SIMD {
 /// is true.
 template <bool ordered, class Found, class Done>
 [[nodiscard]] inline bool walk_packet(const WideBvh& bvh, PacketRays& rays, Found&& found, Done&& done) {
-    const PacketBounds bounds(rays);
-    const float reach = bounds.reach(bvh.bounds);
-    if (!suits_packet(rays, bounds, reach)) return false;
-    const PacketBoxRays box_rays(rays, bounds, reach * k_box_widening);
-    const PacketLines lines(rays, bounds);
-    const PacketTriangleRays triangle_rays(rays);
+    if (!rays.suit(bvh.bounds)) return false;
+    const PacketBoxRays box_rays(rays, rays.reach(bvh.bounds) * k_box_widening);
+    const PacketShear shear(rays);
     float t_max = rays.farthest();
     NullTraversalProbe probe;
     const auto open_block = [&](const TriangleBlock& block) {
-        intersect_block(block, may_meet(block, box_rays, t_max), lines, triangle_rays, found);
+        const Lanes triangles = may_meet(block, box_rays, t_max);
+        if (!any(triangles)) return false;
+        intersect_block(block, triangles, shear, found);
         t_max = rays.farthest();
         return done();
     };
@@ -35,41 +34,43 @@ template <bool ordered, class Found, class Done>
 
 /// Those of the lanes whose hits count.
 [[nodiscard]] inline Lanes filtered(Lanes lanes, HitFilter filter, std::uint32_t triangle,
-                                    const BlockHits& hits) {
+                                    const GroupHits& hits) {
     if (!filter.accept) return lanes;
+    alignas(64) std::array<float, k_group> u, v;
+    store(u.data(), hits.u);
+    store(v.data(), hits.v);
     Lanes accepted = 0;
     for (Lanes left = lanes; any(left); left = without_first(left)) {
         const auto i = static_cast<std::size_t>(first(left));
-        accepted |= Lanes{filter(triangle, hits.u[i], hits.v[i])} << i;
+        accepted |= Lanes{filter(triangle, u[i], v[i])} << i;
     }
     return accepted;
 }
 
 inline void find_closest_packet(const WideBvh& bvh, std::span<const Ray> rays, HitFilter filter,
                                 std::span<std::optional<Hit>> closest) {
-    std::fill(closest.begin(), closest.end(), std::nullopt);
-    if (bvh.empty() || rays.empty()) return;
+    if (bvh.empty() || rays.empty()) return std::fill(closest.begin(), closest.end(), std::nullopt);
     PacketRays packet(rays);
     alignas(64) PacketRays::Row u, v;
-    std::array<std::uint32_t, k_packet_rays> triangles;
+    alignas(64) std::array<std::uint32_t, k_packet_rays> triangles;
     constexpr std::uint32_t none = 0xffffffff;
     triangles.fill(none);
     const auto keep_closest = [&](std::size_t first_ray, Lanes met, std::uint32_t triangle,
-                                  const BlockHits& hits) {
-        const Float8 t = load(hits.t.data());
+                                  const GroupHits& hits) {
         float* const t_max = packet.t_max.data() + first_ray;
-        for (Lanes ties = met & at_most(load(t_max), t); any(ties); ties = without_first(ties))
+        for (Lanes ties = met & at_most(load16(t_max), hits.t); any(ties); ties = without_first(ties))
             if (triangles[first_ray + std::size_t(first(ties))] < triangle) met &= ~(ties & -ties);
         met = filtered(met, filter, triangle, hits);
-        const auto keep = [met](float* row, Float8 news) { store(row, select(met, news, load(row))); };
-        keep(t_max, t);
-        keep(u.data() + first_ray, load(hits.u.data()));
-        keep(v.data() + first_ray, load(hits.v.data()));
+        const auto keep = [met](float* row, Float16 news) { store(row, select(met, news, load16(row))); };
+        keep(t_max, hits.t);
+        keep(u.data() + first_ray, hits.u);
+        keep(v.data() + first_ray, hits.v);
         for (; any(met); met = without_first(met)) triangles[first_ray + std::size_t(first(met))] = triangle;
     };
     if (walk_packet<true>(bvh, packet, keep_closest, [] { return false; })) {
         for (std::size_t i = 0; i < rays.size(); ++i)
-            if (triangles[i] != none) closest[i] = Hit{packet.t_max[i], u[i], v[i], triangles[i]};
+            closest[i] = triangles[i] == none ? std::nullopt
+                                              : std::optional(Hit{packet.t_max[i], u[i], v[i], triangles[i]});
         return;
     }
     NullTraversalProbe probe;
@@ -83,7 +84,7 @@ inline void find_closest_packet(const WideBvh& bvh, std::span<const Ray> rays, H
     std::uint32_t met = 0;
     const std::uint32_t all = ~0u >> (k_packet_rays - rays.size());
     const auto accept = [&](std::size_t first_ray, Lanes lanes, std::uint32_t triangle,
-                            const BlockHits& hits) {
+                            const GroupHits& hits) {
         lanes = filtered(lanes, filter, triangle, hits);
         met |= lanes << first_ray;
         for (; any(lanes); lanes = without_first(lanes)) {  // These need no more.

@@ -54,7 +54,7 @@ TEST_CASE("arithmetic is that of single floats, lane by lane") {
 TEST_CASE("sixteen floats are sixteen single ones") {
     HashRng rng(4);
     for (int round = 0; round < 1000; ++round) {
-        alignas(64) std::array<float, 16> a, b, ratio, chosen, least_of, greatest_of, about, fused_sum;
+        alignas(64) std::array<float, 16> a, b, ratio, chosen, least_of, greatest_of, about, fused_sum, size;
         for (std::size_t i = 0; i < 16; ++i) a[i] = rng.next_float() - 0.5f, b[i] = rng.next_float() - 0.5f;
         const Float16 x = load16(a.data()), y = load16(b.data());
         const Lanes lanes = rng.next_u32() & 0xffff;
@@ -64,10 +64,12 @@ TEST_CASE("sixteen floats are sixteen single ones") {
         store(greatest_of.data(), max(x, y));
         store(about.data(), about_multiply_add(x, y, x));
         store(fused_sum.data(), fused(x, y, x));
+        store(size.data(), magnitude(x));
         CHECK(least(x) == *std::min_element(a.begin(), a.end()));
         CHECK(greatest(x) == *std::max_element(a.begin(), a.end()));
         const Lanes at_most_lanes = at_most(x, y);
         for (std::size_t i = 0; i < 16; ++i) {
+            CHECK(size[i] == std::abs(a[i]));
             CHECK(ratio[i] == (a[i] + b[i]) / (a[i] - 2));
             CHECK(chosen[i] == ((lanes >> i & 1) != 0 ? a[i] : b[i]));
             CHECK(least_of[i] == std::min(a[i], b[i]));
@@ -77,6 +79,21 @@ TEST_CASE("sixteen floats are sixteen single ones") {
             const double product = double(a[i]) * double(b[i]), exact = product + double(a[i]);
             CHECK(std::abs(about[i] - exact) <= 0x1.01p-24 * (std::abs(product) + std::abs(exact)));
         }
+    }
+}
+
+TEST_CASE("eight times eight floats, turned over the diagonal") {
+    std::array<Float8, 8> rows;
+    for (int i = 0; i < 8; ++i) {
+        alignas(32) std::array<float, 8> row;
+        for (int j = 0; j < 8; ++j) row[std::size_t(j)] = float(8 * i + j);
+        rows[std::size_t(i)] = load(row.data());
+    }
+    const std::array<Float8, 8> columns = transposed(rows);
+    for (int j = 0; j < 8; ++j) {
+        alignas(32) std::array<float, 8> column;
+        store(column.data(), columns[std::size_t(j)]);
+        for (int i = 0; i < 8; ++i) CHECK(column[std::size_t(i)] == float(8 * i + j));
     }
 }
 

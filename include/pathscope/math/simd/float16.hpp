@@ -22,6 +22,7 @@ inline void store(float* sixteen, Float16 a) { _mm512_store_ps(sixteen, a.lanes)
 [[nodiscard]] inline Float16 operator/(Float16 a, Float16 b) { return {_mm512_div_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float16 min(Float16 a, Float16 b) { return {_mm512_min_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float16 max(Float16 a, Float16 b) { return {_mm512_max_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float16 magnitude(Float16 a) { return {_mm512_abs_ps(a.lanes)}; }
 [[nodiscard]] inline Lanes at_most(Float16 a, Float16 b) {
     return _mm512_cmp_ps_mask(a.lanes, b.lanes, _CMP_LE_OQ);
 }
@@ -58,6 +59,7 @@ inline void store(float* sixteen, Float16 a) {
 [[nodiscard]] inline Float16 operator/(Float16 a, Float16 b) { return {a.low / b.low, a.high / b.high}; }
 [[nodiscard]] inline Float16 min(Float16 a, Float16 b) { return {min(a.low, b.low), min(a.high, b.high)}; }
 [[nodiscard]] inline Float16 max(Float16 a, Float16 b) { return {max(a.low, b.low), max(a.high, b.high)}; }
+[[nodiscard]] inline Float16 magnitude(Float16 a) { return {magnitude(a.low), magnitude(a.high)}; }
 [[nodiscard]] inline Lanes at_most(Float16 a, Float16 b) {
     return at_most(a.low, b.low) | at_most(a.high, b.high) << 8;
 }

@@ -23,6 +23,7 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 [[nodiscard]] inline Float8 operator/(Float8 a, Float8 b) { return {_mm256_div_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 min(Float8 a, Float8 b) { return {_mm256_min_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) { return {_mm256_max_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float8 magnitude(Float8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.lanes)}; }
 /// a b + c, rounded once or twice: for estimates with a margin, not for results.
 [[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) {
     return {_mm256_fmadd_ps(a.lanes, b.lanes, c.lanes)};
@@ -49,6 +50,25 @@ inline void store(float* eight, Float8 a) { _mm256_store_ps(eight, a.lanes); }
 #else
     return static_cast<Lanes>(_mm256_movemask_ps(_mm256_cmp_ps(a.lanes, b.lanes, _CMP_LE_OQ)));
 #endif
+}
+
+/// Lane j of number i becomes lane i of number j.
+[[nodiscard]] inline std::array<Float8, 8> transposed(const std::array<Float8, 8>& rows) {
+    std::array<Float8, 8> pairs, fours, columns;
+    for (std::size_t i = 0; i < 8; i += 2) {
+        pairs[i] = {_mm256_unpacklo_ps(rows[i].lanes, rows[i + 1].lanes)};
+        pairs[i + 1] = {_mm256_unpackhi_ps(rows[i].lanes, rows[i + 1].lanes)};
+    }
+    for (const std::size_t i : {0, 1, 4, 5}) {
+        const std::size_t four = i / 4 * 4 + i % 4 * 2;
+        fours[four] = {_mm256_shuffle_ps(pairs[i].lanes, pairs[i + 2].lanes, 0x44)};
+        fours[four + 1] = {_mm256_shuffle_ps(pairs[i].lanes, pairs[i + 2].lanes, 0xee)};
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+        columns[i] = {_mm256_permute2f128_ps(fours[i].lanes, fours[i + 4].lanes, 0x20)};
+        columns[i + 4] = {_mm256_permute2f128_ps(fours[i].lanes, fours[i + 4].lanes, 0x31)};
+    }
+    return columns;
 }
 
 #if PATHSCOPE_SIMD_AT_LEAST(avx512)
@@ -107,6 +127,9 @@ inline void store(float* eight, Float8 a) {
 [[nodiscard]] inline Float8 max(Float8 a, Float8 b) {
     return lanewise::each(a, b, [](float x, float y) { return x > y ? x : y; });
 }
+[[nodiscard]] inline Float8 magnitude(Float8 a) {
+    return lanewise::each(a, a, [](float x, float) { return std::abs(x); });
+}
 [[nodiscard]] inline Float8 about_multiply_add(Float8 a, Float8 b, Float8 c) { return a * b + c; }
 [[nodiscard]] inline Float8 fused(Float8 a, Float8 b, Float8 c) {
     Float8 result;
@@ -118,6 +141,12 @@ inline void store(float* eight, Float8 a) {
     Float8 result;
     for (std::size_t i = 0; i < 8; ++i) result.lanes[i] = (chosen >> i & 1) != 0 ? a.lanes[i] : b.lanes[i];
     return result;
+}
+[[nodiscard]] inline std::array<Float8, 8> transposed(const std::array<Float8, 8>& rows) {
+    std::array<Float8, 8> columns;
+    for (std::size_t i = 0; i < 8; ++i)
+        for (std::size_t j = 0; j < 8; ++j) columns[j].lanes[i] = rows[i].lanes[j];
+    return columns;
 }
 [[nodiscard]] inline float least(Float8 a) { return *std::min_element(a.lanes.begin(), a.lanes.end()); }
 [[nodiscard]] inline float greatest(Float8 a) { return *std::max_element(a.lanes.begin(), a.lanes.end()); }
