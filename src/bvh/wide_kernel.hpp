@@ -22,7 +22,7 @@ inline namespace PATHSCOPE_SIMD {
 /// by 2^-20 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
 struct WideBoxRay {
     struct Slab {
-        Float8 near_offset, far_offset, inverse;
+        Float8 near_offset, far_offset, near_inverse, far_inverse;
         std::size_t near, far;  ///< Where the planes lie in WideNode::bounds, in floats.
     };
     Slab x, y, z;
@@ -35,8 +35,13 @@ struct WideBoxRay {
     static Slab slab(const BoxRay& ray, int axis, SlabPlanes planes) {
         const float most = 0x1p24f * min_component(abs(ray.inverse));
         const float inverse = std::max(std::min(ray.inverse[axis], most), -most);
-        return {broadcast(-ray.near_origin[axis] * inverse), broadcast(-ray.far_origin[axis] * inverse),
-                broadcast(inverse), planes.near * k_wide, planes.far * k_wide};
+        const float stretched = inverse * k_far_stretch;
+        return {broadcast(-ray.near_origin[axis] * inverse),
+                broadcast(-ray.far_origin[axis] * stretched),
+                broadcast(inverse),
+                broadcast(stretched),
+                planes.near * k_wide,
+                planes.far * k_wide};
     }
 };
 
@@ -45,14 +50,14 @@ struct WideBoxRay {
                                               Float8& t_near) {
     const float* const planes = node.bounds[0].data();
     const auto near = [&](const WideBoxRay::Slab& slab) {
-        return about_multiply_add(load(planes + slab.near), slab.inverse, slab.near_offset);
+        return about_multiply_add(load(planes + slab.near), slab.near_inverse, slab.near_offset);
     };
     const auto far = [&](const WideBoxRay::Slab& slab) {
-        return about_multiply_add(load(planes + slab.far), slab.inverse, slab.far_offset);
+        return about_multiply_add(load(planes + slab.far), slab.far_inverse, slab.far_offset);
     };
     t_near = max(max(near(ray.x), near(ray.y)), max(near(ray.z), ray.t_min));
-    const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max)));
-    return at_most(t_near, t_far * broadcast(k_far_stretch));
+    const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max * k_far_stretch)));
+    return at_most(t_near, t_far);
 }
 
 // ---- Eight triangles.
@@ -147,8 +152,12 @@ class WideStack {
         }
     }
 
+    [[nodiscard]] bool empty() const { return size_ == 0; }
+    /// The last child that was pushed. Requires: !empty().
+    [[nodiscard]] std::uint32_t pop() { return child_of(entries_[--size_]); }
+
     /// The next child that begins before t_max; false if there is none left.
-    [[nodiscard]] bool pop(float t_max, std::uint32_t& child) {
+    [[nodiscard]] bool pop_before(float t_max, std::uint32_t& child) {
         const float limit = t_max * k_far_stretch;
         while (size_ > 0) {
             const Entry next = entries_[--size_];
@@ -164,28 +173,26 @@ class WideStack {
     std::array<Entry, k_wide_max_depth*(k_wide - 1) + k_wide> entries_;
 };
 
-/// Which of the children that are met comes next; the others wait. All of them are on their way from memory at once.
-///
-/// ordered: the nearest. Most nodes have one or two: those need no sorting, and no branch that depends on which is nearer.
-/// Else: the last, which is the largest (collapse.cpp), since that is where any hit is likely.
-template <bool ordered>
-[[nodiscard]] inline std::uint32_t choose_child(const WideBvh& bvh, const WideNode& node, Lanes met,
-                                                Float8 t_near, WideStack& stack) {
+/// The child in a lane, which is asked for because it will be visited soon.
+[[nodiscard]] inline std::uint32_t take_child(const WideBvh& bvh, const WideNode& node, std::size_t lane) {
+    const std::uint32_t child = node.children[lane];
+    child& k_leaf_child ? prefetch(bvh.blocks[child & ~k_leaf_child]) : prefetch(bvh.nodes[child]);
+    return child;
+}
+
+/// Of the children that are met, the nearest; the others wait. All of them are on their way from memory at once. Most nodes
+/// have one or two: those need no sorting, and no branch that depends on which is nearer.
+[[nodiscard]] inline std::uint32_t nearest_child(const WideBvh& bvh, const WideNode& node, Lanes met,
+                                                 Float8 t_near, WideStack& stack) {
     alignas(32) std::array<float, k_wide> distances;
     store(distances.data(), t_near);
     const auto take = [&] {
-        const auto i = static_cast<std::size_t>(first(met));
+        const auto lane = static_cast<std::size_t>(first(met));
         met = without_first(met);
-        const std::uint32_t child = node.children[i];
-        child& k_leaf_child ? prefetch(bvh.blocks[child & ~k_leaf_child]) : prefetch(bvh.nodes[child]);
-        return WideStack::entry(distances[i], child);
+        return WideStack::entry(distances[lane], take_child(bvh, node, lane));
     };
-    WideStack::Entry one = take();
+    const WideStack::Entry one = take();
     if (!any(met)) return WideStack::child_of(one);
-    if constexpr (!ordered) {
-        for (; any(met); one = take()) stack.push(one);
-        return WideStack::child_of(one);
-    }
     const WideStack::Entry two = take();
     const WideStack::Entry nearer = std::min(one, two), farther = std::max(one, two);
     stack.push(farther);
@@ -194,14 +201,23 @@ template <bool ordered>
     std::size_t count = 2;
     for (; any(met); ++count) stack.push(take());
     stack.sort_top(count);
-    std::uint32_t child = 0;
-    (void)stack.pop(k_infinity, child);
-    return child;
+    return stack.pop();
 }
 
-/// Calls open_block(block) for the blocks that the ray meets before t_max, nearer ones first (as far as boxes tell), until it
-/// returns true. `ordered` = false leaves the order open.
-template <bool ordered, class BoxRays, class OpenBlock, class Probe>
+/// The last, where a hit is likely for little work (collapse.cpp); the others wait.
+[[nodiscard]] inline std::uint32_t likeliest_child(const WideBvh& bvh, const WideNode& node, Lanes met,
+                                                   WideStack& stack) {
+    for (;;) {
+        const std::uint32_t child = take_child(bvh, node, static_cast<std::size_t>(first(met)));
+        met = without_first(met);
+        if (!any(met)) return child;
+        stack.push(child);
+    }
+}
+
+/// Calls open_block(block) for the blocks that the ray meets before t_max, until it returns true: nearer ones first (as far as
+/// boxes tell), or those first that are likeliest to stop it.
+template <bool nearest_first, class BoxRays, class OpenBlock, class Probe>
 inline void walk(const WideBvh& bvh, const BoxRays& ray, const float& t_max, OpenBlock&& open_block,
                  Probe& probe) {
     WideStack stack;
@@ -214,11 +230,20 @@ inline void walk(const WideBvh& bvh, const BoxRays& ray, const float& t_max, Ope
             const Lanes met = intersect_children(node, ray, t_max, t_near);
             for (std::size_t i = 0; i < k_wide; ++i) probe.test_box(node.children[i], 0, met >> i & 1);
             if (!any(met)) break;
-            current = choose_child<ordered>(bvh, node, met, t_near, stack);
+            if constexpr (nearest_first)
+                current = nearest_child(bvh, node, met, t_near, stack);
+            else
+                current = likeliest_child(bvh, node, met, stack);
             probe.enter_node(current);
         }
         if ((current & k_leaf_child) && open_block(bvh.blocks[current & ~k_leaf_child])) return;
-    } while (stack.pop(t_max, current));
+        if constexpr (nearest_first) {
+            if (!stack.pop_before(t_max, current)) return;
+        } else {
+            if (stack.empty()) return;
+            current = stack.pop();
+        }
+    } while (true);
 }
 
 template <class Probe>
