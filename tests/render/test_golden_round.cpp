@@ -77,7 +77,7 @@ TEST_CASE("the last bit of one corner, colour or light is enough for another gol
     nudge(golden.scene.materials[4].ior);
     CHECK(render_golden(golden) != golden_hash());
     golden = make_golden_scene();
-    nudge(golden.settings[1].transport.roulette.max_survival);
+    nudge(golden.settings[0].transport.roulette.constant_survival);
     CHECK(render_golden(golden) != golden_hash());
 }
 
