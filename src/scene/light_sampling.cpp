@@ -1,5 +1,8 @@
 #include "pathscope/scene/light_sampling.hpp"
 
+#include <algorithm>
+#include <array>
+
 #include "lookup.hpp"
 #include "pathscope/math/frame.hpp"
 #include "pathscope/sampling/spherical_triangle.hpp"
@@ -47,45 +50,66 @@ std::optional<LightSample> unless_dark(const Request& request, LightSample sampl
 /// Solid angles that are sampled: of triangles seen edge-on, and from their own plane, too few digits are left.
 constexpr float k_least_solid_angle = 1e-4f, k_most_solid_angle = 6.28f;
 
-using SeenTriangle = std::optional<SphericalTriangle>;
+/// A light as a near point sees it: its triangles, and the solid angle of both.
+struct SeenLight {
+    std::array<SphericalTriangle, 2> triangles;  ///< The second of a quad only.
+    float solid_angle;
+    float first_share;  ///< Of the first triangle in the solid angle.
+};
 
 /// Apart from the test below, which most of the time ends the matter.
-[[gnu::noinline]] SeenTriangle see_near_light(const TriangleLight& light, Vec3 position) {
-    const auto& [a, b, c] = light.corners;
-    const SphericalTriangle seen = see_triangle(position, a, b, c);
-    const float solid_angle = seen.solid_angle();
-    if (!(solid_angle > k_least_solid_angle && solid_angle < k_most_solid_angle)) return std::nullopt;
+[[gnu::noinline]] std::optional<SeenLight> see_near_light(const TriangleLight& light, Vec3 position) {
+    std::optional<SeenLight> seen;
+    const auto see = [&](const TriangleCorners& t) { return see_triangle(position, t.a, t.b, t.c); };
+    const SphericalTriangle first = see(light.corners[0]);
+    const SphericalTriangle second = light.is_quad() ? see(light.corners[1]) : SphericalTriangle{};
+    const float of_first = first.solid_angle(), solid_angle = of_first + second.solid_angle();
+    if (solid_angle > k_least_solid_angle && solid_angle < k_most_solid_angle)
+        seen.emplace(SeenLight{{first, second}, solid_angle, of_first / solid_angle});
     return seen;
 }
 
-/// The triangle as the reference sees it, if it is sampled by solid angle. Density and sampling both ask here, so that they
+/// The light as the reference sees it, if it is sampled by solid angle. Density and sampling both ask here, so that they
 /// agree.
-SeenTriangle seen_from_near(LightSampling sampling, const LightReference& reference,
-                            const TriangleLight& light) {
+std::optional<SeenLight> seen_from_near(LightSampling sampling, const LightReference& reference,
+                                        const TriangleLight& light) {
     const bool near =
         length_squared(light.centre - reference.position) < light.longest_side * light.longest_side;
     if (!near || sampling == LightSampling::area) return std::nullopt;
     return see_near_light(light, reference.position);
 }
 
-float triangle_pdf(const SeenTriangle& seen, const Connection& to_light, const TriangleLight& light,
-                   Vec3 normal) {
-    return seen ? sample_spherical_triangle_pdf(*seen)
-                : to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
+float triangle_pdf(const std::optional<SeenLight>& seen, const Connection& to_light,
+                   const TriangleLight& light, Vec3 normal) {
+    return seen ? 1 / seen->solid_angle : to_light.to_solid_angle(sample_triangle_pdf(light.area), normal);
+}
+
+/// A point of one of the light's triangles. u.x chooses which, and is stretched to serve again.
+struct PointOnTriangles {
+    std::size_t triangle;
+    Vec2 weights;  ///< Of its second and third corner.
+};
+PointOnTriangles sample_triangles(const TriangleLight& light, const std::optional<SeenLight>& seen, Vec2 u) {
+    const float share = seen ? seen->first_share : light.first_share;
+    const std::size_t triangle = u.x < share ? 0 : 1;
+    u.x = triangle == 0 ? u.x / share : (u.x - share) / (1 - share);
+    u.x = std::min(u.x, k_one_minus_epsilon);
+    return {triangle, seen ? sample_spherical_triangle(seen->triangles[triangle], u) : sample_triangle(u)};
 }
 
 std::optional<LightSample> sample(const Request& request, const TriangleLight& light) {
     std::optional<LightSample>
         sample;  // The only thing returned, so that it is made where the caller wants it.
-    const SeenTriangle seen = seen_from_near(request.sampling, request.reference, light);
-    const Vec2 weights = seen ? sample_spherical_triangle(*seen, request.u) : sample_triangle(request.u);
+    const std::optional<SeenLight> seen = seen_from_near(request.sampling, request.reference, light);
+    const auto [triangle, weights] = sample_triangles(light, seen, request.u);
     SurfacePoint point;
     if (light.even) {
-        point.position = exact_point(light.corners, weights.x, weights.y);
+        point.position = exact_point(light.corners[triangle], weights.x, weights.y);
         point.position_error = position_error(point.position, request.scene.mesh.longest_side);
         point.geometric_normal = light.normal;
     } else {
-        point = surface_point(request.scene.mesh, {0, weights.x, weights.y, light.triangle});
+        point = surface_point(request.scene.mesh, {0, weights.x, weights.y,
+                                                   triangle == 0 ? light.triangle : light.second_triangle});
     }
     const Connection to_light(request.reference, point.position);
     if (!to_light.valid()) return sample;

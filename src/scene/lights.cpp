@@ -34,7 +34,9 @@ double power_of(const LightTable& table, const EnvironmentLight& light, double d
     return double(luminance(table.environments[light.map].mean_radiance)) * 4 * k_double_pi * disc_area;
 }
 
+/// Of two lights each counts the same (lights.hpp).
 std::vector<double> weights_by_power(const LightTable& table, float scene_radius) {
+    if (table.lights.size() == 2) return {1, 1};
     std::vector<double> weights;
     for (const Light& light : table.lights) weights.push_back(light_power(table, light, scene_radius));
     return weights;
@@ -177,15 +179,36 @@ TriangleLight make_triangle_light(const Mesh& mesh, std::uint32_t triangle, cons
                                   Rgb mean_radiance) {
     TriangleLight light;
     light.triangle = triangle;
-    light.corners = corners(mesh, triangle);
-    light.area = area(light.corners);
+    const TriangleCorners corner = corners(mesh, triangle);
+    light.corners[0] = corner;
+    light.area = area(corner);
     light.mean_radiance = mean_radiance;
     light.two_sided = material.two_sided_emission;
-    light.longest_side = longest_side(light.corners);
-    light.centre = (light.corners.a + light.corners.b + light.corners.c) * (1 / 3.0f);
+    light.longest_side = longest_side(corner);
+    light.centre = (corner.a + corner.b + corner.c) * (1 / 3.0f);
     light.normal = surface_point(mesh, {0, 1 / 3.0f, 1 / 3.0f, triangle}).geometric_normal;
     light.even = !material.map_ke && !material.map_d && has_one_normal(mesh, triangle, light.normal);
     return light;
+}
+
+std::optional<TriangleLight> make_quad_light(const TriangleLight& first, const TriangleLight& second) {
+    const bool alike = first.even && second.even && first.normal == second.normal &&
+                       first.mean_radiance == second.mean_radiance && first.two_sided == second.two_sided;
+    const TriangleCorners &p = first.corners[0], &q = second.corners[0];
+    int common = 0;
+    for (const Vec3 corner : {q.a, q.b, q.c}) common += corner == p.a || corner == p.b || corner == p.c;
+    if (!alike || common != 2) return std::nullopt;
+
+    TriangleLight quad = first;
+    quad.second_triangle = second.triangle;
+    quad.corners[1] = q;
+    quad.area = first.area + second.area;
+    quad.first_share = first.area / quad.area;
+    Box box = bounds(p);
+    box.add(bounds(q));
+    quad.longest_side = max_component(box.extent());
+    quad.centre = box.centre();
+    return quad;
 }
 
 SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg) {

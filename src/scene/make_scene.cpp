@@ -98,7 +98,15 @@ CornerSet corner_set(const TriangleCorners& triangle) {
     return set;
 }
 
-/// Of emitters that coincide rays meet the first only, so only that one is a light.
+std::optional<TriangleLight> quad_with_last(const LightTable& table, const TriangleLight& light) {
+    if (table.lights.empty()) return std::nullopt;
+    const TriangleLight& last = std::get<TriangleLight>(table.lights.back());
+    if (last.is_quad() || last.triangle + 1 != light.triangle) return std::nullopt;
+    return make_quad_light(last, light);
+}
+
+/// Of emitters that coincide rays meet the first only, so only that one is a light. A triangle that makes a quad with the one
+/// before it joins that one's light: so files and loaders cut quads.
 void add_triangle_lights(Scene& scene) {
     LightTable& table = scene.lights;
     std::set<CornerSet> seen;
@@ -108,9 +116,14 @@ void add_triangle_lights(Scene& scene) {
         if (table.of_triangle.empty()) table.of_triangle.assign(scene.mesh.triangle_count(), k_no_light);
         const TriangleCorners where = corners(scene.mesh, triangle);
         if (!(area(where) > 0) || !seen.insert(corner_set(where)).second) continue;
-        table.of_triangle[triangle] = std::uint32_t(table.lights.size());
-        table.lights.push_back(
-            make_triangle_light(scene.mesh, triangle, material, mean_radiance(scene, triangle)));
+        const TriangleLight light =
+            make_triangle_light(scene.mesh, triangle, material, mean_radiance(scene, triangle));
+        if (const auto quad = quad_with_last(table, light)) {
+            table.lights.back() = *quad;
+        } else {
+            table.lights.push_back(light);
+        }
+        table.of_triangle[triangle] = std::uint32_t(table.lights.size() - 1);
     }
 }
 
@@ -158,11 +171,11 @@ struct AddLight {
 
 // ---- Where the lights are.
 
-std::optional<LightBounds> bounds_of(const Scene& scene, const TriangleLight& light) {
-    const TriangleCorners where = corners(scene.mesh, light.triangle);
+std::optional<LightBounds> bounds_of(const Scene&, const TriangleLight& light) {
     LightBounds bounds;
-    for (const Vec3 corner : {where.a, where.b, where.c}) bounds.box.add(corner);
-    bounds.normal = surface_point(scene.mesh, {0, 1 / 3.0f, 1 / 3.0f, light.triangle}).geometric_normal;
+    bounds.box = pathscope::bounds(light.corners[0]);
+    if (light.is_quad()) bounds.box.add(pathscope::bounds(light.corners[1]));
+    bounds.normal = light.normal;
     bounds.side = light.two_sided ? ShinesTo::both_sides : ShinesTo::front;
     bounds.intensity = double(luminance(light.mean_radiance)) * light.area;
     return bounds;

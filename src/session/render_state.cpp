@@ -228,7 +228,8 @@ Result<RenderState> decode_state(const PackMap& map) {
     settings.direct_spp = fields.u32("direct_spp", 0, k_max_samples_per_pixel);
     settings.seed = fields.u32("seed");
     settings.transport.light = fields.enumerator<LightSampling>("light");
-    settings.transport.light_samples = int(fields.u32("light_samples", 1, k_max_light_samples));
+    settings.transport.light_samples =
+        int(fields.u32("light_samples", k_auto_light_samples, k_max_light_samples));
     settings.transport.hemisphere = fields.enumerator<HemisphereSampling>("hemisphere");
     settings.transport.mis = fields.enumerator<MisHeuristic>("mis");
     settings.transport.sampler = fields.enumerator<SamplerKind>("sampler");

@@ -51,3 +51,32 @@ TEST_CASE("the irradiance below a rectangular light is Lambert's form factor tim
             CHECK(std::abs(moments.mean() - answer) < 4 * moments.standard_error() + 1e-6 * answer);
         }
 }
+
+TEST_CASE(
+    "of one light a vertex takes one sample, of two one of each, of more two; or as many as it is told") {
+    std::vector<LightSpec> lights;
+    TransportSettings settings = make_settings(Setting::best);
+    for (const int expected : {1, 2, 2, 2}) {
+        lights.push_back(PointLightSpec{{float(lights.size()), 1, 0}, {1, 1, 1}});
+        const Scene scene = small_scene(empty_parts(), lights);
+        CHECK(light_sample_count(scene, settings) == expected);
+        settings.light_samples = 5;
+        CHECK(light_sample_count(scene, settings) == 5);
+        settings.light_samples = k_auto_light_samples;
+    }
+}
+
+TEST_CASE("two lights without area that light an open floor leave nothing to chance") {
+    SceneParts parts = empty_parts();
+    add_rectangle(parts, {-50, 0, -50}, {0, 0, 100}, {100, 0, 0}, add_material(parts, lambert({1, 1, 1})));
+    const Scene scene = small_scene(
+        std::move(parts), {SunSpec{{0, 1, 0}, {2, 2, 2}, 0}, PointLightSpec{{0, 5, 0}, {75, 75, 75}}});
+    for (std::uint32_t i = 0; i < 100; ++i) {
+        const PixelSampler sampler(SamplerKind::independent, 3, 0, 0, i);
+        std::uint64_t rays = 0;
+        const Ray ray{{0, 1, 0}, {0, -1, 0}};
+        const Rgb found =
+            estimate_radiance<LightPart::direct>(scene, make_settings(Setting::best), ray, sampler, rays);
+        CHECK(found.x == doctest::Approx((2 + 75 / 25.0) / std::acos(-1.0)));
+    }
+}

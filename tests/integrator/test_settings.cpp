@@ -30,6 +30,7 @@ TEST_CASE("every lever has one name for each of its positions") {
 TEST_CASE("textbook and best differ in every lever") {
     const TransportSettings best = make_settings(Setting::best), textbook = make_settings(Setting::textbook);
     CHECK(best.light != textbook.light);
+    CHECK(best.light_samples != textbook.light_samples);
     CHECK(best.hemisphere != textbook.hemisphere);
     CHECK(best.mis != textbook.mis);
     CHECK(best.sampler != textbook.sampler);

@@ -95,13 +95,59 @@ TEST_CASE("power: nine times the radiance or nine times the area is picked nine 
     const Scene scene = small_scene({QuadLightSpec{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}, {1, 1, 1}},
                                      QuadLightSpec{{5, 1, 0}, {1, 0, 0}, {0, 0, 1}, {9, 9, 9}},
                                      QuadLightSpec{{9, 1, 0}, {3, 0, 0}, {0, 0, 3}, {1, 1, 1}}});
-    REQUIRE(scene.lights.lights.size() == 6);
+    REQUIRE(scene.lights.lights.size() == 3);
     const auto p = [&](std::uint32_t light) {
         return pick_probability(scene.lights, LightSampling::power, light);
     };
-    CHECK(p(0) == doctest::Approx(0.5 / 19).epsilon(1e-5));
-    CHECK(p(2) == doctest::Approx(4.5 / 19).epsilon(1e-5));
-    CHECK(p(5) == doctest::Approx(4.5 / 19).epsilon(1e-5));
+    CHECK(p(0) == doctest::Approx(1 / 19.0).epsilon(1e-5));
+    CHECK(p(1) == doctest::Approx(9 / 19.0).epsilon(1e-5));
+    CHECK(p(2) == doctest::Approx(9 / 19.0).epsilon(1e-5));
+}
+
+TEST_CASE("power: of two lights each is picked as often as the other, so that two samples are one of each") {
+    const Scene scene = small_scene({SkySpec{{1, 1, 1}}, SunSpec{{0, 1, 0}, {9, 9, 9}, 1}});
+    for (const LightSampling sampling : {LightSampling::power, LightSampling::tree})
+        for (const float u : {0.0f, 0.3f, 0.49f}) {
+            const auto first = pick_light(scene.lights, sampling, {}, u);
+            const auto second = pick_light(scene.lights, sampling, {}, u + 0.5f);
+            REQUIRE((first && second));
+            CHECK(first->light != second->light);
+            CHECK(first->probability == 0.5f);
+            CHECK(second->probability == 0.5f);
+        }
+}
+
+TEST_CASE("two triangles in a row that make an even quad are one light, and no others are") {
+    SceneParts quads = empty_parts();
+    Material lamp = grey();
+    lamp.ke = {1, 1, 1};
+    const std::uint32_t material = add_material(quads, lamp);
+    add_rectangle(quads, {0, 0, 0}, {1, 0, 0}, {0, 0, 1}, material);
+    add_rectangle(quads, {5, 0, 0}, {1, 0, 0}, {0, 0, 2}, material);
+    const auto lights_of = [&](const SceneParts& parts) {
+        return small_scene(parts, {EmissiveMtlSpec{}}).lights;
+    };
+    const LightTable two = lights_of(quads);
+    REQUIRE(two.lights.size() == 2);
+    CHECK(two.of_triangle == std::vector<std::uint32_t>{0, 0, 1, 1});
+    const TriangleLight& second = std::get<TriangleLight>(two.lights[1]);
+    CHECK(second.is_quad());
+    CHECK(second.area == doctest::Approx(2));
+    CHECK(second.first_share == doctest::Approx(0.5));
+    CHECK(second.longest_side == doctest::Approx(2));
+    CHECK(second.centre == Vec3{5.5f, 0, 1});
+
+    SceneParts folded = quads, mapped = quads, apart = quads, mixed = quads;
+    folded.mesh.positions[2].y = 0.5f;
+    CHECK(lights_of(folded).lights.size() == 3);
+    std::swap(apart.mesh.triangles[1], apart.mesh.triangles[2]);
+    CHECK(lights_of(apart).lights.size() == 4);
+    mixed.mesh.materials[1] = add_material(mixed, lamp);
+    mixed.materials.back().ke = {1, 1, 2};
+    CHECK(lights_of(mixed).lights.size() == 3);
+    mapped.textures.push_back(Texture(TextureUsage::colour, Image8{1, 1, 3, {255, 255, 255}}));
+    mapped.materials[material].map_ke.index = 0;
+    CHECK(lights_of(mapped).lights.size() == 4);
 }
 
 TEST_CASE("a light fainter by 40 orders of magnitude is still picked at times") {

@@ -129,9 +129,9 @@ TEST_CASE("Ke lights the scene if the file lists it, or no light at all") {
         CHECK(glows == (hit->light != k_no_light));
         return glows ? int(scene.lights.lights.size()) : -int(scene.lights.lights.size());
     };
-    CHECK(lights({}) == 2);
-    CHECK(lights({EmissiveMtlSpec{}}) == 2);
-    CHECK(lights({SkySpec{k_white}, EmissiveMtlSpec{}}) == 3);
+    CHECK(lights({}) == 1);
+    CHECK(lights({EmissiveMtlSpec{}}) == 1);
+    CHECK(lights({SkySpec{k_white}, EmissiveMtlSpec{}}) == 2);
     CHECK(lights({SkySpec{k_white}}) == -1);
 }
 

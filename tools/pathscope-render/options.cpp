@@ -63,8 +63,8 @@ void add_levers(CLI::App& app, RenderOptions& options) {
     TransportSettings& transport = options.settings.transport;
     add_lever(app, "--light", transport.light, "how a light is picked");
     app.add_option("--light-samples", transport.light_samples,
-                   fmt::format("light samples per vertex ({})", transport.light_samples))
-        ->check(CLI::Range(1, k_max_light_samples))
+                   "light samples per vertex (0 = two, or one where one light is to pick; textbook 1)")
+        ->check(CLI::Range(k_auto_light_samples, k_max_light_samples))
         ->type_name("N");
     add_lever(app, "--hemisphere", transport.hemisphere, "how the next direction is drawn");
     add_lever(app, "--mis", transport.mis, "how light and BRDF samples are weighed");

@@ -30,6 +30,7 @@ struct PartsRadiance {
     Rgb direct_throughput{1, 1, 1};  // Until the direct part ends.
     bool indirect_lives = true;
     PathOrigin origin;
+    PathStrength strength;
     int diffuse_vertices = 0;
 
     for (int bounce = 0;; ++bounce) {
@@ -64,9 +65,11 @@ struct PartsRadiance {
             break;
         }
         direct_throughput = throughput;
+        strength.now = max_component(throughput);
+        if (is_first_diffuse) strength.first = strength.now;
         if (diffuse_vertices > 0 || bounce >= k_free_specular_bounces) {
             const std::optional<float> weight =
-                roulette_weight(max_component(throughput), bounce, random.roulette(), settings.roulette);
+                roulette_weight(strength, bounce, random.roulette(), settings.roulette);
             indirect_lives = weight.has_value();
             // Before the first diffuse vertex both parts play; at it the indirect one alone.
             if (!indirect_lives && !(is_first_diffuse && direct_lives)) break;

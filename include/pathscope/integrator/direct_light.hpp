@@ -14,6 +14,7 @@
 /// Thread safety: pure; `rays` is the caller's.
 /// Test: tests/integrator/test_direct_light.cpp (form factor)    Lesson: lessons/04-light-sampling
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -22,9 +23,15 @@
 
 namespace pathscope {
 
+/// How many light samples a vertex takes.
+[[nodiscard]] inline int light_sample_count(const Scene& scene, const TransportSettings& settings) {
+    if (settings.light_samples != k_auto_light_samples) return settings.light_samples;
+    return std::min(2, int(scene.lights.lights.size()));
+}
+
 /// One of the light samples at a vertex: f Le V cos / p_l, with its MIS weight, and divided by their number.
 [[nodiscard]] inline Rgb one_light_sample(const Scene& scene, const TransportSettings& settings,
-                                          const Vertex& vertex, float u_pick, Vec2 u_point,
+                                          const Vertex& vertex, int count, float u_pick, Vec2 u_point,
                                           std::uint64_t& rays) {
     const std::optional<LightSample> light =
         sample_light(scene, settings.light, vertex.light_reference(), u_pick, u_point);
@@ -36,24 +43,25 @@ namespace pathscope {
     ++rays;
     if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
 
-    const float density = float(settings.light_samples) * light->pdf_solid_angle;
+    const float density = float(count) * light->pdf_solid_angle;
     const float weight = light->delta ? 1.0f : mis_weight(settings.mis, density, bsdf.pdf_solid_angle);
     return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / density);
 }
 
-/// Light at the vertex by settings.light_samples samples: a lattice of n points, turned by one random shift, so that sun
-/// and sky, or two lamps, are seldom picked by chance alone. Requires: !vertex.specular.
+/// Light at the vertex: a lattice of n points, turned by one random shift. So two samples of sun and sky, or of two lamps, are one of
+/// each, and of more lights they are at least spread. Requires: !vertex.specular.
 [[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
                                              const Vertex& vertex, const BounceSample& random,
                                              std::uint64_t& rays) {
     const float u_pick = random.light_pick();
     const Vec2 u_point = random.light_point();
+    const int count = light_sample_count(scene, settings);
     Rgb sum;
-    for (int i = 0; i < settings.light_samples; ++i) {
-        const float shift = float(i) / float(settings.light_samples);
+    for (int i = 0; i < count; ++i) {
+        const float shift = float(i) / float(count);
         const auto turned = [shift](float u) { return u + shift - std::floor(u + shift); };
-        sum +=
-            one_light_sample(scene, settings, vertex, turned(u_pick), {turned(u_point.x), u_point.y}, rays);
+        sum += one_light_sample(scene, settings, vertex, count, turned(u_pick),
+                                {turned(u_point.x), u_point.y}, rays);
     }
     return sum;
 }
@@ -76,8 +84,8 @@ namespace pathscope {
     const float light_pdf =
         hit ? sample_light_pdf(scene, settings.light, origin.reference, *hit)
             : sample_environment_pdf(scene, settings.light, origin.reference, ray.direction);
-    return emitted *
-           mis_weight(settings.mis, origin.pdf_solid_angle, float(settings.light_samples) * light_pdf);
+    const auto count = float(light_sample_count(scene, settings));
+    return emitted * mis_weight(settings.mis, origin.pdf_solid_angle, count * light_pdf);
 }
 
 }  // namespace pathscope

@@ -64,6 +64,7 @@ template <LightPart part, class Probe = NullPathProbe>
     auto [ray, hit] = first;
     Rgb radiance;
     Rgb throughput{1, 1, 1};
+    PathStrength strength;
     PathOrigin origin;  // What the ray leaves: the camera at first, later a vertex.
     int diffuse_vertices = 0;
 
@@ -100,11 +101,13 @@ template <LightPart part, class Probe = NullPathProbe>
         if (is_zero(throughput)) break;
         if (!is_finite(throughput))
             return throughput;  // Not a radiance: the caller drops and counts the sample.
+        strength.now = max_component(throughput);
+        if (is_first_diffuse) strength.first = strength.now;
         const bool plays_roulette =
             diffuse_vertices > 0 ? part == LightPart::indirect : bounce >= k_free_specular_bounces;
         if (plays_roulette) {
             const std::optional<float> weight =
-                roulette_weight(max_component(throughput), bounce, random.roulette(), settings.roulette);
+                roulette_weight(strength, bounce, random.roulette(), settings.roulette);
             if (!weight) break;
             throughput *= *weight;
         }

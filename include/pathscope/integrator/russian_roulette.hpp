@@ -12,14 +12,13 @@
 ///
 ///   q = T sqrt(E[R²] / V · C / c)   (or 1)
 ///
-/// Of a scene whose light bounces about, the rest of a path is a path like the whole one: the root is a number of about
-/// the same size everywhere, somewhat above 1, and needs no pilot picture. Measured, variance times rays is least between 2
-/// and 4 in a Cornell box, a Sponza and a conference room alike: k_efficiency_gain. So a path goes on unharmed while T is
-/// above a third, from the first vertex on, and below that its survivors carry a third.
-/// What it buys against `throughput` (Lambert, 8 bounces, 64 samples, variance times processor time): a factor of 2.7 in
-/// the Sponza, whose dark surfaces no longer send three bounces each, 1.3 in the conference room, and nothing in the
-/// Cornell box, whose surfaces are bright. Sample for sample dark surfaces become noisier, by a factor of 1.4 in relative
-/// variance in the Sponza, for a third of the time. So it is a lever, and not part of the best setting.
+/// The pixel of a dark surface has little variance: V is about in proportion to F², F the throughput after the first vertex.
+/// And of a scene whose light bounces about, the rest of a path is a path like the whole one. So the root is 1/F times a number
+/// of about the same size everywhere, somewhat above 1, which needs no pilot picture: k_efficiency_gain. With 2, a path goes
+/// on unharmed while it carries half of what it did after its first vertex, and below that its survivors carry a half.
+/// What it buys against `throughput` (Lambert, 8 bounces, relative variance times rays): a factor of 1.5 in the Sponza, whose
+/// dark surfaces no longer send three bounces each, for three fifths of the rays at 1.1 times the relative variance; 1.05 in
+/// the Cornell box, whose surfaces are bright.
 /// Units: throughput is a ratio (radiance out / radiance in), so q is dimensionless.
 /// See:   Arvo & Kirk 1990, "Particle Transport and Image Synthesis"; P_RR in Yan's GAMES101; Veach 1997, section 10.4,
 ///        and Rath et al. 2022, "EARS: Efficiency-Aware Russian Roulette and Splitting", who estimate what is constant here.
@@ -43,11 +42,11 @@ constexpr std::array k_roulette_names{EnumName<Roulette>{Roulette::constant, "co
 constexpr const auto& enum_table(Roulette) { return k_roulette_names; }
 
 /// Survival by throughput, for `efficiency`.
-inline constexpr float k_efficiency_gain = 3;
+inline constexpr float k_efficiency_gain = 2;
 
 struct RouletteParams {
-    Roulette kind = Roulette::throughput;
-    int first_bounce = 3;  ///< Bounces before this one always survive; of `efficiency`, where T allows.
+    Roulette kind = Roulette::efficiency;
+    int first_bounce = 3;  ///< Bounces before this one always survive; of `efficiency`, where T / F allows.
     float constant_survival = 0.8f;  ///< q of `constant` (P_RR), in (0, 1].
     float max_survival =
         0.95f;  ///< Upper bound of q for the others: below 1, so that a path in a white box ends.
@@ -55,23 +54,28 @@ struct RouletteParams {
     friend bool operator==(const RouletteParams&, const RouletteParams&) = default;
 };
 
-/// q. Requires: max_throughput >= 0 (largest channel).
-[[nodiscard]] inline float survival_probability(float max_throughput, int bounce,
-                                                const RouletteParams& params) {
+/// What the roulette asks of a path: the largest channels of two of its throughputs.
+struct PathStrength {
+    float now = 1;    ///< T, >= 0.
+    float first = 1;  ///< F: after the first vertex that is not specular, > 0; before it, 1.
+};
+
+/// q.
+[[nodiscard]] inline float survival_probability(PathStrength path, int bounce, const RouletteParams& params) {
     const bool spared = bounce < params.first_bounce;
     if (params.kind == Roulette::efficiency)
-        return std::min(k_efficiency_gain * max_throughput, spared ? 1.0f : params.max_survival);
+        return std::min(k_efficiency_gain * path.now / path.first, spared ? 1.0f : params.max_survival);
     if (spared) return 1;
     return params.kind == Roulette::constant ? params.constant_survival
-                                             : std::min(max_throughput, params.max_survival);
+                                             : std::min(path.now, params.max_survival);
 }
 
 /// Returns the weight to multiply the throughput by, or nothing if the path ends here.
-/// Requires: max_throughput >= 0 (largest channel); u uniform in [0, 1).
-[[nodiscard]] inline std::optional<float> roulette_weight(float max_throughput, int bounce, float u,
+/// Requires: u uniform in [0, 1).
+[[nodiscard]] inline std::optional<float> roulette_weight(PathStrength path, int bounce, float u,
                                                           const RouletteParams& params = {}) {
-    CHECK(max_throughput >= 0, max_throughput);
-    const float survival = survival_probability(max_throughput, bounce, params);
+    CHECK(path.now >= 0 && path.first > 0, path.now, path.first);
+    const float survival = survival_probability(path, bounce, params);
     if (u >= survival) return std::nullopt;
     return 1.0f / survival;
 }

@@ -3,8 +3,8 @@
 ///
 ///   textbook: the estimator of Yan's GAMES101 and of Huang's "A Distributed Path Tracer": light uniform by area,
 ///             hemisphere uniform, constant roulette, independent random numbers, no MIS.
-///   best:     light by a tree where there are many, else by power, two samples of it per vertex, BRDF sampling, MIS by the
-///             power heuristic, roulette by throughput, Owen-scrambled Sobol.
+///   best:     light by a tree where there are many, else by power, one or two samples of it per vertex, BRDF sampling, MIS by
+///             the power heuristic, roulette by efficiency, Owen-scrambled Sobol.
 ///
 /// Why: both converge to the same image, so a lesson can ask what each lever buys.
 /// Thread safety: values.   Test: tests/integrator/test_settings.cpp
@@ -26,9 +26,14 @@ constexpr std::array k_setting_names{EnumName<Setting>{Setting::best, "best"},
                                      EnumName<Setting>{Setting::textbook, "textbook"}};
 constexpr const auto& enum_table(Setting) { return k_setting_names; }
 
+/// One light sample per vertex where there is one light to pick, else two: by one alone, sun and sky, or two lamps, are picked by
+/// chance, while a second sample of the same lamp costs a ray and adds little.
+inline constexpr int k_auto_light_samples = 0;
+inline constexpr int k_max_light_samples = 64;
+
 struct TransportSettings {
     LightSampling light = LightSampling::tree;
-    int light_samples = 2;  ///< Per vertex, at least 1.
+    int light_samples = k_auto_light_samples;  ///< Per vertex.
     HemisphereSampling hemisphere = HemisphereSampling::bsdf;
     MisHeuristic mis = MisHeuristic::power;
     SamplerKind sampler = SamplerKind::sobol;
@@ -51,7 +56,5 @@ struct TransportSettings {
     }
     return settings;
 }
-
-inline constexpr int k_max_light_samples = 64;
 
 }  // namespace pathscope

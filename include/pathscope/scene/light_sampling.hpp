@@ -7,11 +7,12 @@
 /// These two pdfs live in different measures, per solid angle and per area: what leaves here is always the first.
 ///
 /// How each kind is sampled, once picked (lights.hpp):
-///   triangle     uniformly by area; closer to its centre than it is long, uniformly in the solid angle that it subtends,
-///                if that is neither nearly nothing nor nearly a hemisphere (sampling/spherical_triangle.hpp). By area the
-///                estimate varies as the cube of the distance where a wall runs past the edge of a lamp: in a Cornell box,
-///                whose lamp hangs just below the ceiling, that makes half of the picture's squared error. Farther away both
-///                densities are nearly the same, and the one by area costs less. For LightSampling::area, always by area
+///   triangle     (or two that make a quad) uniformly by area; closer to its centre than it is long, uniformly in the solid angle
+///                that it subtends, if that is neither nearly nothing nor nearly a hemisphere
+///                (sampling/spherical_triangle.hpp). By area the estimate varies as the cube of the distance where a wall
+///                runs past the edge of a lamp: in a Cornell box, whose lamp hangs just below the ceiling, that makes half of
+///                the picture's squared error. Farther away both densities are nearly the same, and the one by area costs
+///                less. For LightSampling::area, always by area
 ///   sphere       uniformly in the cone that it subtends; for LightSampling::area, uniformly over its whole
 ///                surface, of which the far half is wasted. From inside it is dark: it emits outwards
 ///   point, sun of angle 0     the one direction there is

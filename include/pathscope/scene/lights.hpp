@@ -10,7 +10,8 @@
 ///          Lights without area (point, sun, sky, environment) get equal shares beside it: where there are k
 ///          of them each is picked with probability 1 / (k + 1), and the surface with the rest.
 ///   power  each light in proportion to the power that it sends out; light from infinity sends what falls on
-///          the disc that just covers the scene.
+///          the disc that just covers the scene. Of two lights each is picked as often as the other: a vertex takes two
+///          samples then, and so one of each (integrator/direct_light.hpp).
 ///   tree   each light by what it may send to the point at hand (light_tree.hpp). The lights at infinity stand beside
 ///          the tree: half of the picks are shared equally, among k of them and the tree, and half in proportion to the
 ///          irradiance that each would give without shadows. Equal shares alone waste samples on a faint sky,
@@ -48,20 +49,26 @@ inline constexpr std::array k_light_sampling_names{
 };
 constexpr const auto& enum_table(LightSampling) { return k_light_sampling_names; }
 
-/// A triangle of the mesh whose material emits. Quads are two of them.
+/// A triangle of the mesh whose material emits; or two of them that make a quad, as most lamps are. As one light a quad has one
+/// sample where two triangles would need two, and samples of it are spread over all of it.
 struct TriangleLight {
     std::uint32_t triangle = 0;
-    float area = 0;
+    float area = 0;         ///< Of both.
     Rgb mean_radiance;      ///< For its power; emission itself is looked up at each point (map_ke, cut-outs).
     bool two_sided = true;  ///< Otherwise it emits on the side of its normal only.
 
     /// True if normal and emission are the same at each of its points. Then all that sampling needs to know lies here, in
     /// one place of memory, and mean_radiance is the radiance; else the mesh and the maps are asked at each point.
     bool even = false;
-    TriangleCorners corners{};
+    std::uint32_t second_triangle = k_no_second_triangle;
+    float first_share = 1;  ///< Of the first triangle in the area.
+    std::array<TriangleCorners, 2> corners{};
     Vec3 normal{};  ///< As surface_point() gives it.
     Vec3 centre{};
-    float longest_side = 0;  ///< Of its box.
+    float longest_side = 0;  ///< Of the box around all corners.
+
+    static constexpr std::uint32_t k_no_second_triangle = 0xffffffffu;
+    [[nodiscard]] bool is_quad() const { return second_triangle != k_no_second_triangle; }
 };
 
 /// A sphere that emits the same radiance everywhere, outwards, and is black inside.
@@ -90,6 +97,11 @@ struct SunLight {
 /// Requires: the triangle is not degenerate; its material emits.
 [[nodiscard]] TriangleLight make_triangle_light(const Mesh& mesh, std::uint32_t triangle,
                                                 const Material& material, Rgb mean_radiance);
+
+/// The two as one light; nothing unless both are even, have an edge in common, and do not differ but in their corners.
+/// Requires: neither is a quad.
+[[nodiscard]] std::optional<TriangleLight> make_quad_light(const TriangleLight& first,
+                                                           const TriangleLight& second);
 
 /// Requires: to_sun not zero; angle_deg, the angular diameter, in [0, 180].
 [[nodiscard]] SunLight make_sun_light(Vec3 to_sun, Rgb irradiance, float angle_deg);
