@@ -112,7 +112,6 @@ void tone_map_row(std::span<const Rgb> row, const ToneMapParams& params, std::si
 }  // namespace
 
 float encode_srgb(float linear) { return float(encode(double(linear))); }
-float decode_srgb(float encoded) { return float(decode(double(encoded))); }
 std::uint8_t encode_srgb8(float linear) { return encoder8()(linear); }
 
 float decode_srgb8(std::uint8_t code) {

@@ -67,10 +67,11 @@ std::optional<Distribution1d> Distribution1d::make(std::span<const float> weight
 }
 
 Distribution1d::Pick Distribution1d::sample(float u) const {
-    CHECK(u >= 0 && u < 1, u);
-    const int index = find_share(cdf_, u);
+    const int index = find(u);
     return {index, pmf(index), place_in_share(cdf_, index, u)};
 }
+
+int Distribution1d::find_by_halves(float u) const { return find_share(cdf_, u); }
 
 std::optional<Distribution2d> Distribution2d::make(std::span<const float> weights, int width, int height) {
     CHECK(width >= 0 && height >= 0 && weights.size() == std::size_t(width) * height, width, height,

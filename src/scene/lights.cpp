@@ -256,8 +256,9 @@ std::optional<LightPick> pick_light(const LightTable& table, LightSampling sampl
     if (table.empty()) return std::nullopt;
     sampling = in_effect(table, sampling);
     if (sampling == LightSampling::tree) return pick_by_tree(table, reference, u);
-    const auto pick = table.pick[std::size_t(sampling)].sample(u);
-    return LightPick{std::uint32_t(pick.index), pick.pmf};
+    const Distribution1d& pick = table.pick[std::size_t(sampling)];
+    const int light = pick.find(u);
+    return LightPick{std::uint32_t(light), pick.pmf(light)};
 }
 
 float pick_probability(const LightTable& table, LightSampling sampling, const LightReference& reference,

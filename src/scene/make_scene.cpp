@@ -72,6 +72,15 @@ Result<void> check_size(const Scene& scene) {
                     farthest, k_largest_coordinate));
 }
 
+void add_records(Scene& scene) {
+    for (std::uint32_t triangle = 0; triangle < scene.mesh.triangle_count(); ++triangle) {
+        scene.records.push_back(make_triangle_record(scene.mesh, triangle));
+        if (!scene.materials[scene.records.back().material].map_d) continue;
+        scene.cutouts.resize((scene.mesh.triangle_count() + 63) / 64);
+        scene.cutouts[triangle / 64] |= std::uint64_t{1} << triangle % 64;
+    }
+}
+
 // ---- The table of lights.
 
 /// Mean emission of a triangle for its power: over 16 points, or as it is without maps. At least a hundredth
@@ -264,7 +273,7 @@ Result<Scene> make_scene(const SceneFile& file, SceneParts parts, const SceneBui
         if (const auto* quad = std::get_if<QuadLightSpec>(&light)) add_quad(scene, *quad);
         if (const auto* sphere = std::get_if<SphereLightSpec>(&light)) add_sphere(scene, *sphere);
     }
-    for (const Material& material : scene.materials) scene.has_cutouts |= bool(material.map_d);
+    add_records(scene);
 
     scene.mesh.longest_side = longest_side(scene.mesh);
     scene.bounds = bounds(scene.mesh);

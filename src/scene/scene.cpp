@@ -36,7 +36,7 @@ SceneHit hit_on_sphere(const Scene& scene, const NearestSphere& nearest) {
 }
 
 void fill_hit_on_mesh(const Scene& scene, const Hit& found, SceneHit& hit) {
-    hit.point = surface_point(scene.mesh, found);
+    hit.point = surface_point(scene.mesh, scene.records[found.triangle], found);
     hit.distance = found.t;
     // The material is asked first: it is needed anyway, while the table is one more line from memory.
     if (scene.materials[hit.point.material].emits()) hit.light = scene.lights.of_triangle[found.triangle];
@@ -69,32 +69,34 @@ struct Solid {
 }  // namespace
 
 bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v) {
-    const Material& material = scene.materials[scene.mesh.material_of(triangle)];
-    return !material.map_d || is_solid_at(scene, material, interpolate_uv(scene.mesh, triangle, u, v));
+    const bool has_holes = has_cutouts(scene) && (scene.cutouts[triangle / 64] >> triangle % 64 & 1);
+    if (!has_holes) return true;
+    const Material& material = scene.materials[scene.records[triangle].material];
+    return is_solid_at(scene, material, interpolate_uv(scene.mesh, triangle, u, v));
 }
 
 std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
     return complete_hit(
         scene, ray,
-        scene.has_cutouts ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray));
+        has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray));
 }
 
 void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::optional<SceneHit>> hits) {
     std::array<std::optional<Hit>, k_packet_rays> found;
     const std::span<std::optional<Hit>> closest = std::span(found).first(rays.size());
-    scene.has_cutouts ? closest_hits(scene.tree, rays, closest, Solid{scene})
-                      : closest_hits(scene.tree, rays, closest);
+    has_cutouts(scene) ? closest_hits(scene.tree, rays, closest, Solid{scene})
+                       : closest_hits(scene.tree, rays, closest);
     for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = complete_hit(scene, rays[i], closest[i]);
 }
 
 std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts) {
     return complete_hit(scene, ray,
-                        scene.has_cutouts ? closest_hit(scene.tree, ray, Solid{scene}, counts)
-                                          : closest_hit(scene.tree, ray, AcceptAll{}, counts));
+                        has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}, counts)
+                                           : closest_hit(scene.tree, ray, AcceptAll{}, counts));
 }
 
 bool occluded(const Scene& scene, const Ray& ray) {
-    if (scene.has_cutouts ? any_hit(scene.tree, ray, Solid{scene}) : any_hit(scene.tree, ray)) return true;
+    if (has_cutouts(scene) ? any_hit(scene.tree, ray, Solid{scene}) : any_hit(scene.tree, ray)) return true;
     for (const Sphere& sphere : scene.spheres)
         if (intersect_sphere(ray, sphere.centre, sphere.radius)) return true;
     return false;

@@ -33,6 +33,16 @@ TEST_CASE("sRGB: values of the standard") {
         CHECK(decode_srgb(encode_srgb(float(i) / 1000)) == doctest::Approx(i / 1000.0).epsilon(1e-5));
 }
 
+TEST_CASE("decode_srgb is off the standard's equation by less than 2.5e-6 of its value, and never above 1") {
+    for (int i = 0; i <= 100'000; ++i) {
+        const float encoded = float(i) / 100'000;
+        const double x = encoded;
+        const double exact = x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+        REQUIRE(std::abs(double(decode_srgb(encoded)) - exact) <= 2.5e-6 * exact);
+        REQUIRE(decode_srgb(encoded) <= 1);
+    }
+}
+
 TEST_CASE("encode_srgb8 is correctly rounded") {
     for (int code = 0; code < 256; ++code) CHECK(encode_srgb8(decode_srgb8(std::uint8_t(code))) == code);
     HashRng rng(1);

@@ -420,7 +420,7 @@ TEST_CASE("a textured emitter shines where its texture does, and through no hole
         (as_hole ? lamp.map_d : lamp.map_ke).index = 0;
         add_rectangle(parts, {-1, 2, -1.5f}, {2, 0, 0}, {0, 0, 3}, add_material(parts, lamp));
         const Scene scene = small_scene(std::move(parts), {EmissiveMtlSpec{}});
-        CHECK(scene.has_cutouts == as_hole);
+        CHECK(has_cutouts(scene) == as_hole);
 
         // Below the border between the halves, each of them has the share of half the form factor. The
         // texture repeats, so at the outer border there is a ramp as well.

@@ -73,7 +73,7 @@ TEST_CASE("occlusion knows triangles, spheres, and where the ray ends") {
 
 TEST_CASE("cut-outs are holes for rays of both sorts") {
     const Scene scene = small_scene(wall_with_hole(), {SkySpec{k_white}});
-    CHECK(scene.has_cutouts);
+    CHECK(has_cutouts(scene));
     for (const float x : {-0.9f, -0.6f}) {
         CHECK_FALSE(intersect(scene, {{x, 0.3f, 1}, {0, 0, -1}}));
         CHECK_FALSE(occluded(scene, {{x, 0.3f, 1}, {0, 0, -1}}));

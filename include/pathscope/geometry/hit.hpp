@@ -50,6 +50,12 @@ struct SurfacePoint {
     std::uint32_t material = 0;
 };
 
+/// What all hits of a triangle have in common: worked out once, it spares each of them a square root and a quotient.
+struct TriangleRecord {
+    Vec3 normal;  ///< On the side of the winding, of length one.
+    std::uint32_t material = 0;
+};
+
 /// Texture coordinates alone, for the cut-out test inside the traversal.
 [[nodiscard]] inline Vec2 interpolate_uv(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
     if (mesh.uvs.empty()) return {};
@@ -86,19 +92,29 @@ inline void interpolate_normals(const Mesh& mesh, const Hit& hit, SurfacePoint& 
     point.geometric_normal = facing(point.geometric_normal, point.shading_normal);
 }
 
-/// Requires: the hit is of a triangle of this mesh that is not degenerate.
-[[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const Hit& hit) {
-    const TriangleCorners triangle = corners(mesh, hit.triangle);
+[[nodiscard]] inline TriangleRecord make_triangle_record(const Mesh& mesh, std::uint32_t triangle) {
+    return {geometric_normal(corners(mesh, triangle)), mesh.material_of(triangle)};
+}
+
+/// Requires: the hit is of a triangle of this mesh that is not degenerate, the record is this triangle's.
+[[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const TriangleRecord& record,
+                                                const Hit& hit) {
     SurfacePoint point;
     point.triangle = hit.triangle;
-    point.material = mesh.material_of(hit.triangle);
-    point.position = exact_point(triangle, hit.u, hit.v);
-    const float longest = mesh.longest_side > 0 ? mesh.longest_side : longest_side(triangle);
+    const TriangleCorners corner = corners(mesh, hit.triangle);
+    const float longest = mesh.longest_side > 0 ? mesh.longest_side : longest_side(corner);
+    point.material = record.material;
+    point.position = exact_point(corner, hit.u, hit.v);
     point.position_error = position_error(point.position, longest);
     point.uv = interpolate_uv(mesh, hit.triangle, hit.u, hit.v);
-    point.geometric_normal = point.shading_normal = geometric_normal(triangle);
+    point.geometric_normal = point.shading_normal = record.normal;
     if (!mesh.normals.empty()) interpolate_normals(mesh, hit, point);
     return point;
+}
+
+/// The same where there are no records.
+[[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const Hit& hit) {
+    return surface_point(mesh, make_triangle_record(mesh, hit.triangle), hit);
 }
 
 }  // namespace pathscope

@@ -19,6 +19,7 @@
 #include <span>
 #include <vector>
 
+#include "pathscope/core/check.hpp"
 #include "pathscope/math/vec.hpp"
 
 namespace pathscope {
@@ -37,10 +38,22 @@ class Distribution1d {
     [[nodiscard]] static std::optional<Distribution1d> make(std::span<const float> weights);
 
     [[nodiscard]] Pick sample(float u) const;
+    /// The index alone. Requires: u in [0, 1).
+    [[nodiscard]] int find(float u) const {
+        CHECK(u >= 0 && u < 1, u);
+        // Where the entry's share ends above u. Short lists, such as lights, are soon walked through from their start.
+        if (cdf_.size() > k_short_list) return find_by_halves(u);
+        int index = 0;
+        while (!(u < cdf_[std::size_t(index) + 1])) ++index;
+        return index;
+    }
     [[nodiscard]] float pmf(int index) const { return cdf_[index + 1] - cdf_[index]; }
     [[nodiscard]] int size() const { return int(cdf_.size()) - 1; }
 
   private:
+    static constexpr std::size_t k_short_list = 9;
+    [[nodiscard]] int find_by_halves(float u) const;
+
     std::vector<float> cdf_;  // size() + 1 multiples of 2^-24 from 0 to 1
 };
 

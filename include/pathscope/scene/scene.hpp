@@ -42,13 +42,15 @@ struct Sphere {
 
 struct Scene {
     Mesh mesh;
+    std::vector<TriangleRecord> records;  ///< Of each triangle of the mesh.
+    std::vector<std::uint64_t>
+        cutouts;  ///< A bit for each triangle whose material has holes; empty if none has.
     std::vector<Sphere> spheres;
     std::vector<Material> materials;
     std::vector<Texture> textures;
     Tree tree;
     LightTable lights;
-    Box bounds;                ///< Of mesh and spheres.
-    bool has_cutouts = false;  ///< Else rays need not ask.
+    Box bounds;  ///< Of mesh and spheres.
     /// What quantum_for() asks (image/exact_sum.hpp): a surface well lit, and the brightest emitter.
     float typical_radiance = 0, brightest_radiance = 0;
 };
@@ -91,6 +93,9 @@ void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::opt
 
 /// What arrives from infinity, against `direction`: sky, environment maps and the discs of suns, added up.
 [[nodiscard]] Rgb environment_radiance(const Scene& scene, Vec3 direction);
+
+/// Whether any triangle has holes: else rays need not ask.
+[[nodiscard]] inline bool has_cutouts(const Scene& scene) { return !scene.cutouts.empty(); }
 
 /// False in the holes of the triangle's cut-out.
 [[nodiscard]] bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v);
