@@ -91,9 +91,10 @@ struct PointOnTriangles {
 };
 PointOnTriangles sample_triangles(const TriangleLight& light, const std::optional<SeenLight>& seen, Vec2 u) {
     const float share = seen ? seen->first_share : light.first_share;
-    const std::size_t triangle = u.x < share ? 0 : 1;
-    u.x = triangle == 0 ? u.x / share : (u.x - share) / (1 - share);
+    const bool second = u.x >= share;
+    u.x = (u.x - (second ? share : 0)) / (second ? 1 - share : share);
     u.x = std::min(u.x, k_one_minus_epsilon);
+    const std::size_t triangle = second;
     return {triangle, seen ? sample_spherical_triangle(seen->triangles[triangle], u) : sample_triangle(u)};
 }
 
@@ -102,30 +103,28 @@ std::optional<LightSample> sample(const Request& request, const TriangleLight& l
         sample;  // The only thing returned, so that it is made where the caller wants it.
     const std::optional<SeenLight> seen = seen_from_near(request.sampling, request.reference, light);
     const auto [triangle, weights] = sample_triangles(light, seen, request.u);
-    SurfacePoint point;
+    LightSample& filled = sample.emplace();
+    RayTarget& target = filled.target;
     if (light.even) {
-        point.position = exact_point(light.corners[triangle], weights.x, weights.y);
-        point.position_error = position_error(point.position, request.scene.mesh.longest_side);
-        point.geometric_normal = light.normal;
+        target.position = exact_point(light.corners[triangle], weights.x, weights.y);
+        target.position_error = position_error(target.position, request.scene.mesh.longest_side);
+        target.normal = light.normal;
+        filled.radiance = light.mean_radiance;
     } else {
-        point = surface_point(request.scene.mesh, {0, weights.x, weights.y,
-                                                   triangle == 0 ? light.triangle : light.second_triangle});
+        const SurfacePoint point =
+            surface_point(request.scene.mesh,
+                          {0, weights.x, weights.y, triangle == 0 ? light.triangle : light.second_triangle});
+        target = {point.position, point.position_error, point.geometric_normal};
+        filled.radiance = emission_at(request.scene, point, request.reference.position - point.position);
     }
-    const Connection to_light(request.reference, point.position);
-    if (!to_light.valid()) return sample;
-    const bool faces_reference = light.two_sided || dot(point.geometric_normal, to_light.direction) < 0;
-    const float pdf = request.pick_probability * triangle_pdf(seen, to_light, light, point.geometric_normal);
-    if (!faces_reference || !(pdf > 0)) return sample;
-
-    sample.emplace();
-    sample->direction = to_light.direction;
-    sample->distance = to_light.distance;
-    sample->target = {point.position, point.position_error, point.geometric_normal};
-    sample->radiance =
-        light.even ? light.mean_radiance : emission_at(request.scene, point, -to_light.direction);
-    sample->pdf_solid_angle = pdf;
-    sample->light = request.light;
-    if (is_zero(sample->radiance)) sample.reset();
+    const Connection to_light(request.reference, target.position);
+    filled.direction = to_light.direction;
+    filled.distance = to_light.distance;
+    filled.pdf_solid_angle = request.pick_probability * triangle_pdf(seen, to_light, light, target.normal);
+    filled.light = request.light;
+    const bool faces_reference = light.two_sided || dot(target.normal, to_light.direction) < 0;
+    const bool arrives = to_light.valid() && faces_reference && filled.pdf_solid_angle > 0;
+    if (!arrives || is_zero(filled.radiance)) sample.reset();
     return sample;
 }
 

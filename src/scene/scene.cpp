@@ -36,25 +36,29 @@ SceneHit hit_on_sphere(const Scene& scene, const NearestSphere& nearest) {
 }
 
 void fill_hit_on_mesh(const Scene& scene, const Hit& found, SceneHit& hit) {
-    hit.point = surface_point(scene.mesh, scene.records[found.triangle], found);
+    fill_surface_point(scene.mesh, scene.records[found.triangle], found, hit.point);
     hit.distance = found.t;
     // The material is asked first: it is needed anyway, while the table is one more line from memory.
     if (scene.materials[hit.point.material].emits()) hit.light = scene.lights.of_triangle[found.triangle];
 }
 
-std::optional<SceneHit> complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& hit) {
-    std::optional<SceneHit> completed;
+/// What the ray meets, spheres included, where the hit is the first on the mesh.
+void complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& hit,
+                  std::optional<SceneHit>& completed) {
     if (!scene.spheres.empty()) {
         Ray rest = ray;
         if (hit) rest.t_max = hit->t;
         const auto sphere = nearest_sphere(scene, rest);
         if (sphere && !(hit && sphere->hit.t == hit->t)) {
             completed = hit_on_sphere(scene, *sphere);
-            return completed;
+            return;
         }
     }
-    if (hit) fill_hit_on_mesh(scene, *hit, completed.emplace());
-    return completed;
+    if (hit) {
+        fill_hit_on_mesh(scene, *hit, completed.emplace());
+    } else {
+        completed.reset();
+    }
 }
 
 /// The holes of cut-outs, for a traversal. Scenes without any need not ask.
@@ -75,10 +79,16 @@ bool is_solid(const Scene& scene, std::uint32_t triangle, float u, float v) {
     return is_solid_at(scene, material, interpolate_uv(scene.mesh, triangle, u, v));
 }
 
-std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
-    return complete_hit(
+void intersect(const Scene& scene, const Ray& ray, std::optional<SceneHit>& hit) {
+    complete_hit(
         scene, ray,
-        has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray));
+        has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}) : closest_hit(scene.tree, ray), hit);
+}
+
+std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray) {
+    std::optional<SceneHit> hit;
+    intersect(scene, ray, hit);
+    return hit;
 }
 
 void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::optional<SceneHit>> hits) {
@@ -86,13 +96,16 @@ void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::opt
     const std::span<std::optional<Hit>> closest = std::span(found).first(rays.size());
     has_cutouts(scene) ? closest_hits(scene.tree, rays, closest, Solid{scene})
                        : closest_hits(scene.tree, rays, closest);
-    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = complete_hit(scene, rays[i], closest[i]);
+    for (std::size_t i = 0; i < rays.size(); ++i) complete_hit(scene, rays[i], closest[i], hits[i]);
 }
 
 std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalCounts& counts) {
-    return complete_hit(scene, ray,
-                        has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}, counts)
-                                           : closest_hit(scene.tree, ray, AcceptAll{}, counts));
+    std::optional<SceneHit> hit;
+    complete_hit(scene, ray,
+                 has_cutouts(scene) ? closest_hit(scene.tree, ray, Solid{scene}, counts)
+                                    : closest_hit(scene.tree, ray, AcceptAll{}, counts),
+                 hit);
+    return hit;
 }
 
 bool occluded(const Scene& scene, const Ray& ray) {

@@ -94,15 +94,6 @@ BsdfSample sample_delta(const ThinGlass& surface, Vec3 outgoing, float u_lobe) {
 
 // ---- Samples of the others: a direction with its value and density.
 
-DirectionSample sample_lobes(const Lambert& surface, const SeenBsdf& seen, float, Vec2 u) {
-    const Vec3 incoming = sample_cosine_hemisphere(u);
-    return {incoming, evaluate(surface, seen, incoming)};
-}
-
-DirectionSample sample_lobes(const StandardSurface&, const SeenBsdf& seen, float u_lobe, Vec2 u) {
-    return sample_standard(*seen.standard, u_lobe, u);
-}
-
 template <class Smooth>
 DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& surface, const SeenBsdf& seen,
                                   Vec2 u) {
@@ -110,6 +101,19 @@ DirectionSample sample_hemisphere(HemisphereSampling sampling, const Smooth& sur
         sampling == HemisphereSampling::uniform ? sample_uniform_hemisphere(u) : sample_cosine_hemisphere(u);
     const Rgb value = evaluate(surface, seen, incoming).value;
     return {incoming, {value, hemisphere_pdf(sampling, seen.outgoing, incoming)}};
+}
+
+/// Drawn by the cosine, so that the weight is the albedo. Requires: seen from above.
+std::optional<BsdfSample> sample_by_cosine(const Lambert& surface, const SeenBsdf& seen, Vec2 u) {
+    std::optional<BsdfSample> sample;
+    const Vec3 incoming = sample_cosine_hemisphere(u);
+    if (!(incoming.z > 0) || is_zero(surface.albedo)) return sample;
+    sample.emplace();
+    sample->incoming = incoming;
+    sample->value = surface.albedo * (k_inv_pi * seen.bsdf.opacity);
+    sample->pdf_solid_angle = sample_cosine_hemisphere_pdf(incoming) * seen.bsdf.opacity;
+    sample->weight = surface.albedo;
+    return sample;
 }
 
 /// Nothing if no light can come from there.
@@ -122,9 +126,13 @@ std::optional<BsdfSample> sample_surface(HemisphereSampling sampling, const Kind
     } else {
         std::optional<BsdfSample> sample;
         if (!(seen.outgoing.z > 0)) return sample;
-        const DirectionSample drawn = sampling == HemisphereSampling::bsdf
-                                          ? sample_lobes(surface, seen, u_lobe, u)
-                                          : sample_hemisphere(sampling, surface, seen, u);
+        if constexpr (std::is_same_v<Kind, Lambert>)
+            if (sampling != HemisphereSampling::uniform) return sample_by_cosine(surface, seen, u);
+        const DirectionSample drawn = [&] {
+            if constexpr (std::is_same_v<Kind, StandardSurface>)
+                if (sampling == HemisphereSampling::bsdf) return sample_standard(*seen.standard, u_lobe, u);
+            return sample_hemisphere(sampling, surface, seen, u);
+        }();
         const float pdf = drawn.value.pdf_solid_angle;
         const Rgb weight = drawn.value.value * (drawn.incoming.z / pdf);
         if (!(pdf > 0) || is_zero(weight)) return sample;

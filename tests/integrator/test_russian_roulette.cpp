@@ -27,7 +27,9 @@ TEST_CASE("E[roulette] = 1: survivors carry the weight of the dead, for every ki
                 double sum = 0;
                 const PathStrength path{throughput, 0.5f};
                 for (int i = 0; i < n; ++i)
-                    sum += roulette_weight(path, bounce, rng.next_float(), params).value_or(0.0f);
+                    sum += roulette_weight(
+                               path, bounce, [&] { return rng.next_float(); }, params)
+                               .value_or(0.0f);
                 // A survivor weighs 1/q with probability q: the variance is 1/q - 1. Five standard errors.
                 const double q = survival_probability(path, bounce, params);
                 CHECK(std::abs(sum / n - 1) < 5 * std::sqrt((1 / q - 1) / n) + 1e-6);
@@ -48,10 +50,17 @@ TEST_CASE("the probabilities are those of the header") {
 
 TEST_CASE("bounces before the first never die, black paths die at once, and none lives for ever") {
     for (const Roulette kind : {Roulette::constant, Roulette::throughput})
-        CHECK(roulette_weight({0.0f}, 2, 0.999f, of_kind(kind)) == 1.0f);
+        CHECK(roulette_weight(
+                  {0.0f}, 2, [] { return 0.999f; }, of_kind(kind)) == 1.0f);
     for (const Roulette kind : {Roulette::throughput, Roulette::efficiency}) {
-        CHECK_FALSE(roulette_weight({0.0f}, 3, 0.0f, of_kind(kind)).has_value());
-        CHECK_FALSE(roulette_weight({100.0f}, 3, 0.96f, of_kind(kind)).has_value());
+        CHECK_FALSE(roulette_weight(
+                        {0.0f}, 3, [] { return 0.0f; }, of_kind(kind))
+                        .has_value());
+        CHECK_FALSE(roulette_weight(
+                        {100.0f}, 3, [] { return 0.96f; }, of_kind(kind))
+                        .has_value());
     }
-    CHECK_FALSE(roulette_weight({0.0f}, 0, 0.0f, of_kind(Roulette::efficiency)).has_value());
+    CHECK_FALSE(roulette_weight(
+                    {0.0f}, 0, [] { return 0.0f; }, of_kind(Roulette::efficiency))
+                    .has_value());
 }

@@ -96,10 +96,10 @@ inline void interpolate_normals(const Mesh& mesh, const Hit& hit, SurfacePoint& 
     return {geometric_normal(corners(mesh, triangle)), mesh.material_of(triangle)};
 }
 
+/// In the place where the caller keeps it: once per hit, and copies of what was just written are slow.
 /// Requires: the hit is of a triangle of this mesh that is not degenerate, the record is this triangle's.
-[[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const TriangleRecord& record,
-                                                const Hit& hit) {
-    SurfacePoint point;
+inline void fill_surface_point(const Mesh& mesh, const TriangleRecord& record, const Hit& hit,
+                               SurfacePoint& point) {
     point.triangle = hit.triangle;
     const TriangleCorners corner = corners(mesh, hit.triangle);
     const float longest = mesh.longest_side > 0 ? mesh.longest_side : longest_side(corner);
@@ -109,12 +109,13 @@ inline void interpolate_normals(const Mesh& mesh, const Hit& hit, SurfacePoint& 
     point.uv = interpolate_uv(mesh, hit.triangle, hit.u, hit.v);
     point.geometric_normal = point.shading_normal = record.normal;
     if (!mesh.normals.empty()) interpolate_normals(mesh, hit, point);
-    return point;
 }
 
 /// The same where there are no records.
 [[nodiscard]] inline SurfacePoint surface_point(const Mesh& mesh, const Hit& hit) {
-    return surface_point(mesh, make_triangle_record(mesh, hit.triangle), hit);
+    SurfacePoint point;
+    fill_surface_point(mesh, make_triangle_record(mesh, hit.triangle), hit, point);
+    return point;
 }
 
 }  // namespace pathscope

@@ -45,7 +45,7 @@ struct PartsRadiance {
         if (!indirect_lives || !hit || (settings.max_bounces > 0 && bounce == settings.max_bounces)) break;
 
         const BounceSample random(sampler, bounce);
-        const Vertex vertex = make_vertex(scene, *hit, -ray.direction);
+        const Vertex vertex(scene, *hit, -ray.direction);
         if (!vertex.specular) ++diffuse_vertices;
         const bool is_first_diffuse = !vertex.specular && diffuse_vertices == 1;
         if (!vertex.specular) {
@@ -58,7 +58,7 @@ struct PartsRadiance {
         throughput *= next->weight;
         if (is_zero(throughput)) break;
         const bool direct_lives =
-            diffuse_vertices == 0 || (is_first_diffuse && sees_emitters(settings, next->origin));
+            diffuse_vertices == 0 || (is_first_diffuse && sees_emitters(settings, next->delta));
         if (!is_finite(throughput)) {  // Not a radiance: the caller drops and counts the sample.
             radiance.indirect = throughput;
             if (direct_lives) radiance.direct = throughput;
@@ -68,17 +68,17 @@ struct PartsRadiance {
         strength.now = max_component(throughput);
         if (is_first_diffuse) strength.first = strength.now;
         if (diffuse_vertices > 0 || bounce >= k_free_specular_bounces) {
-            const std::optional<float> weight =
-                roulette_weight(strength, bounce, random.roulette(), settings.roulette);
+            const std::optional<float> weight = roulette_weight(
+                strength, bounce, [&] { return random.roulette(); }, settings.roulette);
             indirect_lives = weight.has_value();
             // Before the first diffuse vertex both parts play; at it the indirect one alone.
             if (!indirect_lives && !(is_first_diffuse && direct_lives)) break;
             if (weight) throughput *= *weight;
             if (diffuse_vertices == 0) direct_throughput = throughput;
         }
-        origin = next->origin;
+        origin = make_origin(vertex, *next);
         ray = spawn_ray(vertex.point, next->direction);
-        hit = intersect(scene, ray);
+        intersect(scene, ray, hit);
         ++rays;
     }
     return radiance;

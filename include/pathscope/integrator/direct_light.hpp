@@ -35,9 +35,9 @@ namespace pathscope {
                                           std::uint64_t& rays) {
     const std::optional<LightSample> light =
         sample_light(scene, settings.light, vertex.light_reference(), u_pick, u_point);
-    if (!light || !is_consistent(vertex.shaded, light->direction)) return {};
+    if (!light || !is_consistent(vertex.side, light->direction)) return {};
 
-    const Vec3 incoming = vertex.shaded.frame.to_local(light->direction);
+    const Vec3 incoming = vertex.side.frame.to_local(light->direction);
     const BsdfValue bsdf = eval_bsdf_and_pdf(settings.hemisphere, vertex.seen, incoming);
     if (is_zero(bsdf.value)) return {};
     ++rays;
@@ -66,9 +66,9 @@ namespace pathscope {
     return sum;
 }
 
-/// Whether emitters count that a ray from this origin runs into.
-[[nodiscard]] inline bool sees_emitters(const TransportSettings& settings, const PathOrigin& origin) {
-    return origin.delta || uses_both_techniques(settings.mis);
+/// Whether emitters count that a ray runs into. delta: its direction has no density.
+[[nodiscard]] inline bool sees_emitters(const TransportSettings& settings, bool delta) {
+    return delta || uses_both_techniques(settings.mis);
 }
 
 /// What the ray runs into sends back along it, with the MIS weight of having found it this way.
@@ -76,7 +76,7 @@ namespace pathscope {
                                           const PathOrigin& origin, const Ray& ray,
                                           const std::optional<SceneHit>& hit) {
     if (hit && hit->light == k_no_light) return {};
-    if (!sees_emitters(settings, origin)) return {};
+    if (!sees_emitters(settings, origin.delta)) return {};
 
     const Rgb emitted =
         hit ? emitted_radiance(scene, *hit, -ray.direction) : environment_radiance(scene, ray.direction);

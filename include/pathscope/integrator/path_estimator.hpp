@@ -84,7 +84,7 @@ template <LightPart part, class Probe = NullPathProbe>
         if (!hit || (settings.max_bounces > 0 && bounce == settings.max_bounces)) break;
 
         const BounceSample random(sampler, bounce);
-        const Vertex vertex = make_vertex(scene, *hit, -ray.direction);
+        const Vertex vertex(scene, *hit, -ray.direction);
         if (!vertex.specular) ++diffuse_vertices;
 
         // Light that reaches the vertex straight from an emitter.
@@ -96,7 +96,7 @@ template <LightPart part, class Probe = NullPathProbe>
         // and does without it where the light sample counts alone.
         const std::optional<NextDirection> next = sample_next_direction(settings, vertex, random);
         if (!next) break;
-        if (part == LightPart::direct && is_first_diffuse && !sees_emitters(settings, next->origin)) break;
+        if (part == LightPart::direct && is_first_diffuse && !sees_emitters(settings, next->delta)) break;
         throughput *= next->weight;
         if (is_zero(throughput)) break;
         if (!is_finite(throughput))
@@ -106,14 +106,14 @@ template <LightPart part, class Probe = NullPathProbe>
         const bool plays_roulette =
             diffuse_vertices > 0 ? part == LightPart::indirect : bounce >= k_free_specular_bounces;
         if (plays_roulette) {
-            const std::optional<float> weight =
-                roulette_weight(strength, bounce, random.roulette(), settings.roulette);
+            const std::optional<float> weight = roulette_weight(
+                strength, bounce, [&] { return random.roulette(); }, settings.roulette);
             if (!weight) break;
             throughput *= *weight;
         }
-        origin = next->origin;
+        origin = make_origin(vertex, *next);
         ray = spawn_ray(vertex.point, next->direction);
-        hit = intersect(scene, ray);
+        intersect(scene, ray, hit);
         ++rays;
     }
     return radiance;

@@ -71,12 +71,14 @@ struct PathStrength {
 }
 
 /// Returns the weight to multiply the throughput by, or nothing if the path ends here.
-/// Requires: u uniform in [0, 1).
-[[nodiscard]] inline std::optional<float> roulette_weight(PathStrength path, int bounce, float u,
-                                                          const RouletteParams& params = {}) {
+/// draw: gives a number uniform in [0, 1); it is asked only where there is a choice.
+template <class Draw>
+[[nodiscard]] std::optional<float> roulette_weight(PathStrength path, int bounce, Draw draw,
+                                                   const RouletteParams& params = {}) {
     CHECK(path.now >= 0 && path.first > 0, path.now, path.first);
     const float survival = survival_probability(path, bounce, params);
-    if (u >= survival) return std::nullopt;
+    if (survival >= 1) return 1.0f;
+    if (draw() >= survival) return std::nullopt;
     return 1.0f / survival;
 }
 

@@ -47,20 +47,22 @@ class BounceSample {
 };
 
 struct Vertex {
-    SurfacePoint point;
-    ShadedPoint shaded;
-    SeenBsdf seen;          ///< Along `outgoing`, local: shared by all samples taken here.
-    bool specular = false;  ///< Only delta lobes: no light sample can be connected to it.
+    const SurfacePoint& point;  ///< Of the hit, which must outlive the vertex.
+    SurfaceSide side;
+    SeenBsdf seen;  ///< Along `outgoing`, local: shared by all samples taken here.
+    bool specular;  ///< Only delta lobes: no light sample can be connected to it.
 
-    [[nodiscard]] LightReference light_reference() const { return {point.position, shaded.frame.normal}; }
+    /// Everything is made in its place. Requires: outgoing of length one, in world space.
+    Vertex(const Scene& scene, const SceneHit& hit, Vec3 outgoing)
+        : point(hit.point),
+          side(see_side(scene, hit, outgoing)),
+          seen{make_bsdf(scene, hit), side.frame.to_local(outgoing), {}},
+          specular(is_specular(seen.bsdf)) {
+        look(seen);
+    }
+
+    [[nodiscard]] LightReference light_reference() const { return {point.position, side.frame.normal}; }
 };
-
-/// Requires: outgoing of length one, in world space.
-[[nodiscard]] inline Vertex make_vertex(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
-    const ShadedPoint shaded = shade_point(scene, hit, outgoing);
-    return {hit.point, shaded, see_bsdf(shaded.bsdf, shaded.frame.to_local(outgoing)),
-            is_specular(shaded.bsdf)};
-}
 
 /// What a ray leaves, as far as the light that it runs into must know: by which density its direction was drawn.
 struct PathOrigin {
@@ -73,8 +75,14 @@ struct PathOrigin {
 struct NextDirection {
     Vec3 direction;  ///< World space, length one.
     Rgb weight;      ///< f |cos| / pdf
-    PathOrigin origin;
+    float pdf_solid_angle = 0;
+    bool delta = false;  ///< By a delta lobe, without density.
 };
+
+/// The vertex, as the ray in this direction leaves it.
+[[nodiscard]] inline PathOrigin make_origin(const Vertex& vertex, const NextDirection& next) {
+    return {vertex.light_reference(), next.pdf_solid_angle, next.delta, !vertex.specular};
+}
 
 /// Nothing if the path ends here: absorbed, or against one of the two normals.
 [[nodiscard]] inline std::optional<NextDirection> sample_next_direction(const TransportSettings& settings,
@@ -84,12 +92,13 @@ struct NextDirection {
     const std::optional<BsdfSample> sample =
         sample_direction(settings.hemisphere, vertex.seen, random.lobe(), random.direction());
     if (!sample) return next;
-    const Vec3 direction = vertex.shaded.frame.to_world(sample->incoming);
-    if (!is_consistent(vertex.shaded, direction)) return next;
+    const Vec3 direction = vertex.side.frame.to_world(sample->incoming);
+    if (!is_consistent(vertex.side, direction)) return next;
     next.emplace();
     next->direction = direction;
     next->weight = sample->weight;
-    next->origin = {vertex.light_reference(), sample->pdf_solid_angle, sample->specular, !vertex.specular};
+    next->pdf_solid_angle = sample->pdf_solid_angle;
+    next->delta = sample->specular;
     return next;
 }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "pathscope/bvh/tree.hpp"
+#include "pathscope/core/huge_pages.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/geometry/hit.hpp"
 #include "pathscope/geometry/mesh.hpp"
@@ -42,7 +43,7 @@ struct Sphere {
 
 struct Scene {
     Mesh mesh;
-    std::vector<TriangleRecord> records;  ///< Of each triangle of the mesh.
+    HugePageVector<TriangleRecord> records;  ///< Of each triangle of the mesh.
     std::vector<std::uint64_t>
         cutouts;  ///< A bit for each triangle whose material has holes; empty if none has.
     std::vector<Sphere> spheres;
@@ -77,6 +78,9 @@ struct SceneHit {
 
 /// The first surface that the ray meets. Requires: direction of length one.
 [[nodiscard]] std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray);
+
+/// The same, in a place that the caller has: a path's rays write it many times over.
+void intersect(const Scene& scene, const Ray& ray, std::optional<SceneHit>& hit);
 
 /// Whether anything lies in [t_min, t_max] of the ray.
 [[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);

@@ -19,18 +19,22 @@
 
 namespace pathscope {
 
-struct ShadedPoint {
-    Bsdf bsdf;
+/// The side of a surface that is seen.
+struct SurfaceSide {
     Frame frame;            ///< World to local: z is the shading normal.
     Vec3 geometric_normal;  ///< On the side of the frame's z.
+};
+
+struct ShadedPoint : SurfaceSide {
+    Bsdf bsdf;
 };
 
 /// The BSDF alone, textures looked up.
 [[nodiscard]] Bsdf make_bsdf(const Scene& scene, const SceneHit& hit);
 
 /// Whether both normals agree on which side `incoming` is. Directions in the surface itself are on neither.
-[[nodiscard]] inline bool is_consistent(const ShadedPoint& point, Vec3 incoming) {
-    return dot(incoming, point.geometric_normal) * dot(incoming, point.frame.normal) > 0;
+[[nodiscard]] inline bool is_consistent(const SurfaceSide& side, Vec3 incoming) {
+    return dot(incoming, side.geometric_normal) * dot(incoming, side.frame.normal) > 0;
 }
 
 /// The shading normal, bent if need be. `geometric` must be on its side: dot(shading, geometric) >= 0.
@@ -53,15 +57,18 @@ struct ShadedPoint {
 }
 
 /// Requires: outgoing of length one.
-[[nodiscard]] inline ShadedPoint shade_point(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
-    ShadedPoint point{make_bsdf(scene, hit), {}, hit.point.geometric_normal};
-    Vec3 normal = bend_normal(hit.point.shading_normal, point.geometric_normal, outgoing);
-    if (!has_inside(point.bsdf) && dot(point.geometric_normal, outgoing) < 0) {
+[[nodiscard]] inline SurfaceSide see_side(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
+    Vec3 geometric = hit.point.geometric_normal;
+    Vec3 normal = bend_normal(hit.point.shading_normal, geometric, outgoing);
+    const bool has_inside = scene.materials[hit.point.material].kind == MaterialKind::dielectric;
+    if (!has_inside && dot(geometric, outgoing) < 0) {
         normal = -normal;
-        point.geometric_normal = -point.geometric_normal;
+        geometric = -geometric;
     }
-    point.frame = Frame::around(normal);
-    return point;
+    return {Frame::around(normal), geometric};
+}
+[[nodiscard]] inline ShadedPoint shade_point(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {
+    return {see_side(scene, hit, outgoing), make_bsdf(scene, hit)};
 }
 
 /// Colour of the surface for filter guides and the albedo buffer.

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "pathscope/core/enum_names.hpp"
+#include "pathscope/core/huge_pages.hpp"
 #include "pathscope/core/result.hpp"
 #include "pathscope/image/image.hpp"
 #include "pathscope/math/vec.hpp"
@@ -63,7 +64,7 @@ class Texture {
     TexelSpace space_;
     int width_, height_;
     std::size_t tiles_per_row_;
-    std::vector<std::uint8_t> texels_;
+    HugePageVector<std::uint8_t> texels_;  // Read at random.
 };
 
 /// Decodes an image file (PNG, JPEG, TGA, BMP). `name` is for the error sentence.

@@ -20,14 +20,19 @@ struct SeenBsdf {
     Bsdf bsdf;
     Vec3 outgoing;
     std::optional<StandardView> standard;  ///< Of a StandardSurface seen from above: it reflects.
-
-    SeenBsdf(const Bsdf& seen, Vec3 from) : bsdf(seen), outgoing(from) {
-        const auto* surface = std::get_if<StandardSurface>(&bsdf.surface);
-        if (surface != nullptr && outgoing.z > 0) standard.emplace(*surface, outgoing);
-    }
 };
 
-[[nodiscard]] inline SeenBsdf see_bsdf(const Bsdf& bsdf, Vec3 outgoing) { return {bsdf, outgoing}; }
+/// Works out what depends on `outgoing`.
+inline void look(SeenBsdf& seen) {
+    const auto* surface = std::get_if<StandardSurface>(&seen.bsdf.surface);
+    if (surface != nullptr && seen.outgoing.z > 0) seen.standard.emplace(*surface, seen.outgoing);
+}
+
+[[nodiscard]] inline SeenBsdf see_bsdf(const Bsdf& bsdf, Vec3 outgoing) {
+    SeenBsdf seen{bsdf, outgoing, {}};
+    look(seen);
+    return seen;
+}
 
 /// As eval_bsdf_and_pdf() of bsdf.hpp.
 [[nodiscard]] BsdfValue eval_bsdf_and_pdf(HemisphereSampling sampling, const SeenBsdf& seen, Vec3 incoming);
