@@ -6,6 +6,7 @@
 ///
 /// Source: Wald, Slusallek, Benthin & Wagner 2001, "Interactive Rendering with Coherent Ray Tracing".
 
+#include "occluder_kernel.hpp"
 #include "packet_boxes.hpp"
 #include "packet_triangles.hpp"
 
@@ -117,6 +118,7 @@ inline constexpr WideKernel k_kernel{
     },
     find_closest_packet,
     find_any_packet,
+    find_any_from,
 };
 
 }  // namespace PATHSCOPE_SIMD

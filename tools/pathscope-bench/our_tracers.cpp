@@ -57,6 +57,13 @@ void trace_any_packets(const WideBvh& tree, std::span<const Ray> rays, std::span
     }
 }
 
+/// The cache is empty at the beginning of each batch.
+void trace_any_cached(const WideBvh& tree, std::span<const Ray> rays, std::span<Answer> answers) {
+    OccluderCache occluders;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        answers[i].triangle = any_hit(tree, rays[i], AcceptAll{}, occluders) ? 0 : k_no_answer;
+}
+
 /// A tree that closest_hit() and any_hit() know. Policy: its type, its name, how to build it, its size.
 template <class Policy>
 class TreeTracer final : public Tracer {
@@ -80,6 +87,10 @@ class TreeTracer final : public Tracer {
             calls.push_back(
                 {"closest_hit", [this](auto rays, auto answers) { trace_closest(tree_, rays, answers); }});
         if constexpr (std::is_same_v<typename Policy::Tree, WideBvh>) {
+            if (any)
+                calls.push_back({"any_hit, occluders kept", [this](auto rays, auto answers) {
+                                     trace_any_cached(tree_, rays, answers);
+                                 }});
             if (coherent && any)
                 calls.push_back({"any_hits", [this](auto rays, auto answers) {
                                      trace_any_packets(tree_, rays, answers);

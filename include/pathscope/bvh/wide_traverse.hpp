@@ -14,6 +14,7 @@
 #include <span>
 #include <type_traits>
 
+#include "pathscope/bvh/occluder_cache.hpp"
 #include "pathscope/bvh/traversal_probe.hpp"
 #include "pathscope/bvh/traverse.hpp"
 #include "pathscope/bvh/wide_bvh.hpp"
@@ -54,6 +55,7 @@ struct WideKernel {
     void (*closest_hit_packet)(const WideBvh&, std::span<const Ray>, HitFilter,
                                std::span<std::optional<Hit>>);
     std::uint32_t (*any_hit_packet)(const WideBvh&, std::span<const Ray>, HitFilter);
+    bool (*any_hit_from)(const WideBvh&, const Ray&, HitFilter, std::uint32_t& occluder);
 };
 
 /// Requires: level <= highest_simd_level().
@@ -71,6 +73,13 @@ template <class Accept = AcceptAll>
 template <class Accept = AcceptAll>
 [[nodiscard]] bool any_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept = {}) {
     return detail::k_wide_kernel.any_hit(bvh, ray, hit_filter(accept));
+}
+
+/// any_hit(bvh, ray, accept), sooner where rays before it were stopped by the same things (occluder_cache.hpp).
+template <class Accept>
+[[nodiscard]] bool any_hit(const WideBvh& bvh, const Ray& ray, const Accept& accept,
+                           OccluderCache& occluders) {
+    return detail::k_wide_kernel.any_hit_from(bvh, ray, hit_filter(accept), occluders.towards(ray.direction));
 }
 
 // The same, counted: a block of triangles is a node, and all of its places are triangles that were tested.
