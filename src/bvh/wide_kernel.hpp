@@ -181,7 +181,7 @@ class WideStack {
 }
 
 /// Of the children that are met, the nearest; the others wait. All of them are on their way from memory at once. Most nodes
-/// have one or two: those need no sorting, and no branch that depends on which is nearer.
+/// have three at most: those need no branch that depends on which is nearer.
 [[nodiscard]] inline std::uint32_t nearest_child(const WideBvh& bvh, const WideNode& node, Lanes met,
                                                  Float8 t_near, WideStack& stack) {
     alignas(32) std::array<float, k_wide> distances;
@@ -195,10 +195,17 @@ class WideStack {
     if (!any(met)) return WideStack::child_of(one);
     const WideStack::Entry two = take();
     const WideStack::Entry nearer = std::min(one, two), farther = std::max(one, two);
-    stack.push(farther);
-    if (!any(met)) return WideStack::child_of(nearer);
-    stack.push(nearer);
-    std::size_t count = 2;
+    if (!any(met)) {
+        stack.push(farther);
+        return WideStack::child_of(nearer);
+    }
+    const WideStack::Entry three = take();
+    const WideStack::Entry between = std::min(farther, three);
+    stack.push(std::max(farther, three));
+    stack.push(std::max(nearer, between));
+    if (!any(met)) return WideStack::child_of(std::min(nearer, between));
+    stack.push(std::min(nearer, between));
+    std::size_t count = 3;
     for (; any(met); ++count) stack.push(take());
     stack.sort_top(count);
     return stack.pop();
