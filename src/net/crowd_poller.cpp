@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 #include <unistd.h>
-#include <zmq.h>
 
 #include <algorithm>
 #include <array>
@@ -12,19 +11,12 @@
 #include <utility>
 
 #include "pathscope/core/check.hpp"
+#include "zmq_call.hpp"
 
 namespace pathscope {
 namespace {
 
 constexpr std::size_t k_named_at_once = 256;  ///< The others are named by the next wait().
-
-int descriptor_of(const Pollable& pollable) {
-    if (!pollable.socket) return pollable.descriptor;
-    int descriptor = -1;
-    std::size_t size = sizeof descriptor;
-    CHECK(zmq_getsockopt(pollable.socket, ZMQ_FD, &descriptor, &size) == 0, zmq_strerror(errno));
-    return descriptor;
-}
 
 }  // namespace
 
@@ -53,11 +45,11 @@ void CrowdPoller::add(const Pollable& pollable, std::uint64_t key) {
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.u64 = key;
-    CHECK(::epoll_ctl(descriptor_, EPOLL_CTL_ADD, descriptor_of(pollable), &event) == 0, errno);
+    CHECK(::epoll_ctl(descriptor_, EPOLL_CTL_ADD, bell_of(pollable), &event) == 0, errno);
 }
 
 void CrowdPoller::remove(const Pollable& pollable) {
-    CHECK(::epoll_ctl(descriptor_, EPOLL_CTL_DEL, descriptor_of(pollable), nullptr) == 0, errno);
+    CHECK(::epoll_ctl(descriptor_, EPOLL_CTL_DEL, bell_of(pollable), nullptr) == 0, errno);
 }
 
 const std::vector<std::uint64_t>& CrowdPoller::wait(TimeNs timeout) {

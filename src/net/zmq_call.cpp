@@ -187,6 +187,14 @@ std::string bound_endpoint(void* socket) {
     return text;
 }
 
+int bell_of(const Pollable& pollable) {
+    if (!pollable.socket) return pollable.descriptor;
+    int bell = -1;
+    std::size_t size = sizeof bell;
+    CHECK(zmq_getsockopt(pollable.socket, ZMQ_FD, &bell, &size) == 0, zmq_strerror(errno));
+    return bell;
+}
+
 int send_frames(void* socket, const std::string* leading, Frames& frames) {
     CHECK(!frames.empty());
     if (leading) {

@@ -28,6 +28,9 @@ void set_option(void* socket, int option, std::string_view value);
 [[nodiscard]] Result<void> connect_socket(void* socket, const std::string& endpoint);
 [[nodiscard]] std::string bound_endpoint(void* socket);
 
+/// The descriptor itself, or the one that ZeroMQ makes readable when something may have happened to its socket.
+[[nodiscard]] int bell_of(const Pollable& pollable);
+
 /// Sends all frames as one message, never blocking. Returns 0, or the errno of the first frame, in which case
 /// nothing was sent and nothing taken. The leading frame (an address) may be null.
 [[nodiscard]] int send_frames(void* socket, const std::string* leading, Frames& frames);

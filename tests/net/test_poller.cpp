@@ -1,5 +1,6 @@
 #include "pathscope/net/poller.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <thread>
@@ -23,6 +24,46 @@ TEST_CASE("a wait ends with nothing after its time, and not before it") {
     CHECK(wait_readable({wake->pollable()}, 1'500'000).none());
     CHECK(monotonic_now() - start >= 1'500'000);
     CHECK(wait_readable({wake->pollable()}, 0).none());
+}
+
+TEST_CASE("waits of less than a millisecond are no longer than that, if the machine has nothing else to do") {
+    const Context context;
+    auto socket = RouterSocket::bind(context, "inproc://quiet");
+    auto wake = WakePair::create();
+    TimeNs shortest = k_second_ns;
+    for (int i = 0; i < 1000 && shortest >= 500'000; ++i) {
+        const TimeNs start = monotonic_now();
+        CHECK(wait_readable({socket->pollable(), wake->pollable()}, 100'000).none());
+        shortest = std::min(shortest, monotonic_now() - start);
+        CHECK(monotonic_now() - start >= 100'000);
+    }
+    CHECK(shortest < 500'000);
+}
+
+TEST_CASE("what comes during a short wait is seen by it or by the next, be it a message or a ring") {
+    const Context context;
+    auto router = RouterSocket::bind(context, "inproc://spoken-to");
+    auto dealer = DealerSocket::connect(context, "inproc://spoken-to", "d");
+    auto wake = WakePair::create();
+    CHECK(wait_readable({dealer->sendable()}, 999'999)[0]);
+    constexpr int k_messages = 2000;
+    std::thread other([&] {
+        for (int i = 0; i < k_messages; ++i) {
+            while (dealer->send({"x"}) != SendOutcome::delivered) std::this_thread::yield();
+            wake->notify();
+        }
+    });
+    int heard = 0, rings = 0;
+    for (const TimeNs limit = monotonic_now() + testing::k_patience;
+         heard < k_messages && monotonic_now() < limit;) {
+        const Readable ready = wait_readable({router->pollable(), wake->pollable()}, 999'999);
+        if (ready[1]) ++rings, wake->clear();
+        if (ready[0])
+            while (router->receive()) ++heard;
+    }
+    other.join();
+    CHECK(heard == k_messages);
+    CHECK(rings > 0);
 }
 
 TEST_CASE("a wait tells which of several are ready") {

@@ -6,7 +6,7 @@
 ///
 /// Why a function and no object: sockets come and go (a server that lost its client opens new ones), and a
 /// list made for each wait cannot hold a socket that is closed.
-/// Units: nanoseconds, rounded up to whole milliseconds; negative = without end. A signal ends the wait
+/// Units: nanoseconds, from a millisecond on rounded up to whole ones; negative = without end. A signal ends the wait
 /// early, with nothing readable.
 /// Thread safety: the thread that owns the sockets.   Test: tests/net/test_poller.cpp
 
