@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "pathscope/core/log.hpp"
@@ -11,11 +10,15 @@
 namespace pathscope {
 namespace {
 
-/// The end of a connection is told a moment before, or after, the socket itself knows: most often a few milliseconds, and on
-/// a busy machine longer. In milliseconds.
-constexpr std::array k_probe_pauses{1, 1, 1, 1, 1, 2, 4, 8, 16, 32};
-constexpr int k_probes = int(k_probe_pauses.size());
-constexpr TimeNs k_confirming_pause = k_millisecond_ns;
+/// The end of a connection is told a moment before the socket itself knows: most often some microseconds, and on a busy
+/// machine many milliseconds. So each pause between two probes is twice the one before.
+constexpr int k_probes = 10;
+constexpr TimeNs k_first_probe_pause = k_millisecond_ns / 10;
+constexpr TimeNs k_confirming_pause = k_first_probe_pause;
+
+/// A probe is a PING to every server, some microseconds each. Who only makes and breaks connections, as fast as it can,
+/// shall not keep the client from its work.
+constexpr TimeNs k_probe_pause_per_server = 20'000;
 
 /// Looking at a thousand servers takes a fraction of a millisecond: not after every message.
 constexpr TimeNs k_shortest_pause = 10 * k_millisecond_ns;
@@ -79,13 +82,14 @@ void ClientMachine::on_connection_lost(TimeNs now) {
     now_ = now;
     if (config_.detector == DetectorKind::fixed) return;
     probes_left_ = k_probes;
-    next_probe_ = now_;
+    next_probe_ = std::max(now_, soonest_probe_);
 }
 
 /// Who cannot be reached twice has no connection any more. Why twice: a server that leaves says so and hangs up, and what it
 /// said is read between the two.
 void ClientMachine::probe_connections() {
-    next_probe_ = now_ + k_probe_pauses[std::size_t(k_probes - probes_left_)] * k_millisecond_ns;
+    soonest_probe_ = now_ + k_probe_pause_per_server * TimeNs(servers_.size());
+    next_probe_ = std::max(soonest_probe_, now_ + (k_first_probe_pause << (k_probes - probes_left_)));
     --probes_left_;
     std::vector<std::string> unreachable;
     for (auto& [instance, server] : servers_) {
@@ -95,7 +99,7 @@ void ClientMachine::probe_connections() {
             unreachable.push_back(instance);
         } else {
             probes_left_ = std::max(probes_left_, 1);
-            next_probe_ = now_ + k_confirming_pause;
+            next_probe_ = std::max(soonest_probe_, now_ + k_confirming_pause);
         }
     }
     for (const std::string& instance : unreachable)

@@ -62,6 +62,47 @@ TEST_CASE(
 }
 
 TEST_CASE(
+    "who is unreachable a moment after its connection ended is given up within a millisecond; later, later") {
+    const Silence silence;
+    for (const TimeNs moment : {TimeNs(0), TimeNs(150'000), 20 * k_millisecond_ns}) {
+        CAPTURE(moment);
+        StagedCluster stage(4096);
+        StagedCluster::Server& a = stage.add_server();
+        stage.add_server();
+        REQUIRE(stage.pass_until([&] { return stage.committed() > 0; }));
+        // The end is told before the socket knows it.
+        const TimeNs end = stage.now();
+        TimeNs now = end;
+        stage.client().on_connection_lost(now);
+        for (;; now = std::max(now + 1, stage.client().next_timer(now))) {
+            a.killed = now >= end + moment;
+            stage.client().on_timers(now);
+            if (stage.client().progress().servers_known == 1 || now >= end + k_second_ns) break;
+        }
+        CHECK(stage.client().progress().servers_known == 1);
+        CHECK(now - end <= (moment < k_millisecond_ns ? k_millisecond_ns / 2 : 3 * moment));
+    }
+}
+
+TEST_CASE(
+    "connections that only come and go, as fast as they can, make the client ask its servers no more often "
+    "than it can bear") {
+    const Silence silence;
+    StagedCluster stage(4096);
+    StagedCluster::Server& a = stage.add_server();
+    stage.add_server();
+    REQUIRE(stage.pass_until([&] { return stage.committed() > 0; }));
+    const std::ptrdiff_t before = count(a.heard, MessageType::ping);
+    for (TimeNs t = 0; t < k_millisecond_ns; t += 1'000) {
+        stage.client().on_connection_lost(stage.now() + t);
+        stage.client().on_timers(stage.now() + t);
+    }
+    stage.pass(10 * k_millisecond_ns);
+    CHECK(count(a.heard, MessageType::ping) - before > 10);
+    CHECK(count(a.heard, MessageType::ping) - before < 60);
+}
+
+TEST_CASE(
     "a HELLO that is said again is welcomed again; with other bits it is refused, and changes nothing") {
     const Silence silence;
     StagedCluster stage(4096, [](ClientConfig& config, RenderSettings&) { config.relaxed = true; });

@@ -309,7 +309,7 @@ class ClientMachine {
     bool announced_alone_ = false;
     std::map<std::string, TimeNs> answered_;  ///< Unknown peers, bounded.
     int probes_left_ = 0;                     ///< Of connections, after one was lost.
-    TimeNs next_probe_ = 0;
+    TimeNs next_probe_ = 0, soonest_probe_ = 0;
 
     Conduct conduct_;
     Audit audit_;
