@@ -126,15 +126,16 @@ void ServerMachine::on(message::Piece& message) {
 
 void ServerMachine::advance_scene() {
     if (!world_.reads_files() || fetch_->complete()) {
-        if (std::exchange(loading_, true)) return;
-        return world_.load(held_->state, world_.reads_files() ? fetch_->manifest() : Manifest{});
+        if (loading_) return;
+        loading_ = world_.reads_files() ? fetch_->manifest() : Manifest{};
+        return world_.load(held_->state, *loading_);
     }
     for (Message& request : fetch_->requests(now_)) send_monitor(std::move(request));
 }
 
 void ServerMachine::on_loaded(LoadedScene& loaded, TimeNs now) {
     now_ = now;
-    loading_ = false;
+    const Manifest files = std::exchange(loading_, std::nullopt).value_or(Manifest{});
     // The client may have gone back to the scene that is here, while this one was loaded: its leases are of that one.
     const bool in_use = held_ && scene_ && same_scene(*scene_state_, held_->state);
     if (loaded.scene && !in_use) {
@@ -146,8 +147,9 @@ void ServerMachine::on_loaded(LoadedScene& loaded, TimeNs now) {
         return advance_scene();  // It wants another one by now.
     if (scene_ && same_scene(*scene_state_, held_->state)) return become_ready();
 
-    // Perhaps a file of the cache is damaged: fetch all of them anew.
-    for (const ManifestEntry& entry : fetch_->manifest().files) cache_.forget(entry.hash);
+    // Perhaps a file of the cache is damaged: fetch all of them anew. They are those of the list that was loaded: another
+    // state of this scene may have come meanwhile, whose list is still on its way.
+    for (const ManifestEntry& entry : files.files) cache_.forget(entry.hash);
     scene_failed(loaded.scene.error());
 }
 

@@ -146,6 +146,51 @@ TEST_CASE("a banned server leaves at once, is silent until the ban's end, and th
     CHECK(says_hello());
 }
 
+TEST_CASE(
+    "a scene that cannot be loaded, though another state of it came meanwhile, has all its files fetched "
+    "anew") {
+    StagedServer stage;
+    auto& [folder, world, server, now] = stage;
+    const std::string bytes = "v 0 0 0\n";
+    Manifest manifest;
+    manifest.files.push_back({"a.obj", bytes.size(), hash_text(bytes)});
+    const auto state_of = [&](std::uint32_t seed) {
+        RenderState state = small_state();
+        state.files = hash_text(pack_manifest(manifest));
+        state.settings.seed = seed;
+        return state;
+    };
+    const auto snapshot_of = [&](const RenderState& state, std::uint32_t number) {
+        const std::string packed = pack(PackValue(encode_state(state)));
+        return message::Snapshot{77, Epoch{number}, number, hash_text(packed), packed};
+    };
+    const auto asked_for = [&](MessageType type) {
+        bool asked = false;
+        for (const Frames& frames : std::exchange(world.sent, {})) asked |= frames[0][3] == char(type);
+        return asked;
+    };
+    const std::string packed = pack(PackValue(encode_state(state_of(1))));
+    server.on_linked(std::string(16, 'i'), now);
+    stage.say(message::Welcome{77, ServerId{1}, 250, 5000, 2, Epoch{1}, 1, hash_text(packed), packed});
+    stage.say(message::Manifest{hash_text(pack_manifest(manifest)), pack_manifest(manifest)});
+    stage.say(message::Piece{hash_text(bytes), 0, bytes.size(), bytes});
+    REQUIRE(world.wanted.has_value());
+
+    stage.say(snapshot_of(state_of(2), 2));
+    LoadedScene damaged{*std::exchange(world.wanted, std::nullopt),
+                        failed("a.obj: it is not what its hash says.")};
+    server.on_loaded(damaged, now);
+    CHECK_FALSE(SceneCache(folder.path()).holds(hash_text(bytes), bytes.size()));
+    CHECK(asked_for(MessageType::manifest_request));
+    stage.say(message::Manifest{hash_text(pack_manifest(manifest)), pack_manifest(manifest)});
+    CHECK(asked_for(MessageType::piece_request));
+    stage.say(message::Piece{hash_text(bytes), 0, bytes.size(), bytes});
+    REQUIRE(world.wanted.has_value());
+    LoadedScene sound{*world.wanted, std::make_shared<const Scene>()};
+    server.on_loaded(sound, now);
+    CHECK(server.working_on() == state_hash(state_of(2)));
+}
+
 TEST_CASE("a scene that is loaded late does not replace the one that the client went back to") {
     constexpr std::uint64_t k_session = 77;
     StagedServer stage;

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "pathscope/core/check.hpp"
 #include "pathscope/core/clock.hpp"
 #include "pathscope/core/hash.hpp"
 #include "pathscope/core/result.hpp"
@@ -44,7 +45,10 @@ class SceneFetch {
     [[nodiscard]] bool complete() const { return manifest_ && missing_.empty(); }
 
     /// Requires: complete().
-    [[nodiscard]] const Manifest& manifest() const { return *manifest_; }
+    [[nodiscard]] const Manifest& manifest() const {
+        CHECK(complete());
+        return *manifest_;
+    }
 
   private:
     /// A file on its way.

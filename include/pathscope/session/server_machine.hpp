@@ -201,7 +201,7 @@ class ServerMachine {
     SceneCache cache_;
     std::optional<SceneFetch> fetch_;
     int fetch_failures_ = 0;
-    bool loading_ = false;
+    std::optional<Manifest> loading_{};       ///< The files of the scene that the world is loading.
     std::optional<RenderState> scene_state_;  ///< What scene_ was loaded for.
     std::shared_ptr<const Scene> scene_;
     std::map<std::uint64_t, message::Lease> leases_;  ///< Those being rendered, by ticket.
