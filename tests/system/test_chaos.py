@@ -111,10 +111,10 @@ class Cluster(unittest.TestCase):
 
     def test_half_close_and_refusal(self):
         """Refused are the first to dial, for whom the client waits, and those that are cut off: if it has not rendered the rest
-        by itself before they dial again."""
-        _, faults = self.render_through("0s fault refuse on\n1500ms fault refuse off\n"
-                                        "3s fault half-close up link 3\n3400ms fault half-close down link 2\n"
-                                        "3800ms fault refuse on\n3900ms fault cut\n5s fault refuse off\n", speed_cap=150_000)
+        by itself before they dial again. Again and again, for on a busy machine servers may come late."""
+        again = "".join(f"{t}ms fault half-close up link 3\n{t + 400}ms fault half-close down link 2\n{t + 800}ms fault refuse on\n"
+                        f"{t + 900}ms fault cut\n{t + 2000}ms fault refuse off\n" for t in range(3000, 40_000, 4000))
+        _, faults = self.render_through("0s fault refuse on\n1500ms fault refuse off\n" + again, speed_cap=150_000)
         self.assertGreaterEqual(faults["links"][2]["up"]["half_closes"], 1)
         self.assertGreaterEqual(sum(link["refused"] for link in faults["links"]), 1)
 
