@@ -28,7 +28,7 @@
 /// origins farther than that, and box_ray.hpp widens boxes by more.
 ///
 /// Ensures: degenerate triangles and triangles seen exactly edge-on are never hit. No absolute epsilon; scenes may be of
-/// any size from 2^-40 to 2^40, where no product of four lengths leaves the range of floats.
+/// any size from 2^-40 to 2^40, where products of two lengths stay well within the range of floats.
 /// Thread safety: pure.   Source: Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1).
 /// Test: tests/geometry/test_triangle.cpp
 
