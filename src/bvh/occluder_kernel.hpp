@@ -7,7 +7,8 @@
 namespace pathscope {
 inline namespace PATHSCOPE_SIMD {
 
-/// As find_any(). `occluder` is asked first, and becomes the block that stops this ray.
+/// As find_any(). `occluder` is asked first, and becomes the block that stops this ray. A text of its own, because find_any() by way of
+/// it is slower, by a twentieth, for those that keep no occluders.
 [[nodiscard]] inline bool find_any_from(const WideBvh& bvh, const Ray& ray, HitFilter filter,
                                         std::uint32_t& occluder) {
     if (bvh.empty() || !(ray.t_min <= ray.t_max)) return false;

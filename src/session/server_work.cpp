@@ -78,14 +78,7 @@ void ServerMachine::on_outcome(RoundOutcome& outcome, TimeNs now) {
                                        : refuse(lease, NackCode::failed, outcome.failure);
     const RoundResult& result = *outcome.result;
 
-    message::Tile tile;
-    tile.session = session_;
-    tile.lease = lease.lease;
-    tile.epoch = lease.epoch;
-    tile.strategy = lease.strategy;
-    tile.unit = lease.unit;
-    tile.first = lease.first;
-    tile.count = lease.count;
+    message::Tile tile = message::make_tile(lease);
     tile.rays = result.rays;
     tile.samples = result.samples;
     tile.started_ns = outcome.started;

@@ -10,6 +10,7 @@
 #include "../session/simulated_renderer.hpp"
 #include "forged_message.hpp"
 #include "fuzz_target.hpp"
+#include "honest_tile.hpp"
 #include "pathscope/core/check.hpp"
 #include "pathscope/protocol/block_result.hpp"
 #include "pathscope/session/admission.hpp"
@@ -154,23 +155,8 @@ class ClientScript : private ClientWorld {
     }
 
     [[nodiscard]] message::Tile tile_of(const message::Lease& lease) const {
-        RoundJob job;
-        job.round = {lease.unit, lease.rect, lease.first, lease.count};
-        job.settings = machine_.state().settings;
-        const RoundResult result = testing::render_by_hash(job, LightPart::indirect);
-        message::Tile tile;
-        tile.session = lease.session;
-        tile.lease = lease.lease;
-        tile.epoch = lease.epoch;
-        tile.strategy = lease.strategy;
-        tile.unit = lease.unit;
-        tile.first = lease.first;
-        tile.count = lease.count;
-        tile.rays = result.rays;
-        tile.samples = result.samples;
-        tile.render_ns = k_millisecond_ns;
-        put_block_result(tile, result.sums, machine_.state().settings.wire);
-        return tile;
+        const RenderSettings& settings = machine_.state().settings;
+        return honest_tile(lease, settings.seed, settings.wire);
     }
     void tile() {
         if (leases_.empty()) return;

@@ -8,10 +8,10 @@
 #include <map>
 #include <utility>
 
-#include "../session/simulated_renderer.hpp"
 #include "../temporary_folder.hpp"
 #include "forged_message.hpp"
 #include "fuzz_target.hpp"
+#include "honest_tile.hpp"
 #include "pathscope/core/check.hpp"
 #include "pathscope/protocol/block_result.hpp"
 #include "pathscope/session/relay_machine.hpp"
@@ -118,28 +118,9 @@ class RelayScript : private RelayWorld {
         CHECK(given->second.answers_left-- > 0, tile.lease.value);
         CHECK(tile.unit == lease.unit && tile.first == lease.first && tile.count == lease.count, tile.unit);
         const RenderState& state = small_state(given->second.state);
-        const message::Tile expected = tile_of(lease, state.settings.seed, state.settings.wire);
+        const message::Tile expected = honest_tile(lease, state.settings.seed, state.settings.wire);
         CHECK(lied_ || tile.samples == expected.samples, tile.samples);
         CHECK(lied_ || tile.hash == expected.hash, tile.unit);
-    }
-    static message::Tile tile_of(const message::Lease& lease, std::uint32_t seed, WireFormat wire) {
-        RoundJob job;
-        job.round = {lease.unit, lease.rect, lease.first, lease.count};
-        job.settings.seed = seed;
-        const RoundResult result = testing::render_by_hash(job, LightPart::indirect);
-        message::Tile tile;
-        tile.session = lease.session;
-        tile.lease = lease.lease;
-        tile.epoch = lease.epoch;
-        tile.strategy = lease.strategy;
-        tile.unit = lease.unit;
-        tile.first = lease.first;
-        tile.count = lease.count;
-        tile.rays = result.rays;
-        tile.samples = result.samples;
-        tile.render_ns = k_millisecond_ns;
-        put_block_result(tile, result.sums, wire);
-        return tile;
     }
 
     // ---- What both sides say.
@@ -312,13 +293,13 @@ class RelayScript : private RelayWorld {
         const std::size_t pick = in_.below(leases_.size());
         const SentLease sent = leases_[pick];
         if (in_.flag()) leases_.erase(leases_.begin() + std::ptrdiff_t(pick));  // Else it may come twice.
-        say_below(sent.peer, tile_of(sent.lease, sent.seed, WireFormat::exact));
+        say_below(sent.peer, honest_tile(sent.lease, sent.seed, WireFormat::exact));
     }
     /// Somebody else's, of another range, of another light.
     void wrong_tile() {
         if (leases_.empty()) return;
         const SentLease sent = leases_[in_.below(leases_.size())];
-        message::Tile tile = tile_of(sent.lease, sent.seed, WireFormat::exact);
+        message::Tile tile = honest_tile(sent.lease, sent.seed, WireFormat::exact);
         std::size_t peer = sent.peer;
         switch (in_.below(7)) {
             case 0:

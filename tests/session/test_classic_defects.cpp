@@ -23,14 +23,7 @@ std::size_t count(const std::vector<MessageType>& all, MessageType type) {
 
 /// The answer of a server to a lease, with so many pixels.
 message::Tile tile_for(const message::Lease& lease, std::size_t pixels) {
-    message::Tile tile;
-    tile.session = lease.session;
-    tile.lease = lease.lease;
-    tile.epoch = lease.epoch;
-    tile.strategy = lease.strategy;
-    tile.unit = lease.unit;
-    tile.first = lease.first;
-    tile.count = lease.count;
+    message::Tile tile = message::make_tile(lease);
     put_block_result(tile, std::vector<PixelSum>(pixels, PixelSum{1, 1, 1}));
     return tile;
 }

@@ -215,6 +215,19 @@ struct Tile {
     bool operator==(const Tile&) const = default;
 };
 
+/// The tile that answers a lease, before anything is rendered.
+[[nodiscard]] inline Tile make_tile(const Lease& lease) {
+    Tile tile;
+    tile.session = lease.session;
+    tile.lease = lease.lease;
+    tile.epoch = lease.epoch;
+    tile.strategy = lease.strategy;
+    tile.unit = lease.unit;
+    tile.first = lease.first;
+    tile.count = lease.count;
+    return tile;
+}
+
 struct Nack {
     std::uint64_t session = 0;
     LeaseId lease;
