@@ -181,6 +181,32 @@ TEST_CASE("a ray along an axis opens no more nodes than one beside it") {
     }
 }
 
+TEST_CASE(
+    "of walls one behind the other, however many, those before the first hit are opened, and no other") {
+    HashRng rng(28);
+    for (const int walls : {1, 2, 3, 6}) {
+        Mesh mesh;
+        for (int i = 1; i <= walls; ++i) add_quad(mesh, {-1, -1, float(2 * i)}, {2, 0, 0}, {0, 2, 0}, 2);
+        for (const float end :
+             {0.0f, float(2 * walls + 2)}) {  // A triangle that rays pass by, though in its box.
+            const auto first = std::uint32_t(mesh.positions.size());
+            for (const Vec3 corner : {Vec3{-1, -1, end}, Vec3{1, -1, end}, Vec3{-1, 1, end}})
+                mesh.positions.push_back(corner);
+            mesh.triangles.push_back({first, first + 1, first + 2});
+        }
+        const WideBvh bvh = build_wide_bvh(mesh);
+        for (const SimdLevel level : levels())
+            for (const bool forward : {true, false}) {
+                TraversalCounts counts;
+                const float z = forward ? -1.0f : float(2 * walls + 3);
+                const Ray ray{random_point(rng, {{0.3f, 0.3f, z}, {0.7f, 0.7f, z}}),
+                              {0, 0, forward ? 1.0f : -1.0f}};
+                REQUIRE(wide_kernel(level).count_closest_hit(bvh, ray, {}, counts));
+                CHECK(counts.nodes == 3);  // The root, the triangle, a wall.
+            }
+    }
+}
+
 TEST_CASE("who looks for any hit looks where much surface costs little, before a larger box") {
     // A wall of two triangles, and behind it many small ones in larger boxes.
     HashRng rng(26);

@@ -82,8 +82,11 @@ class ClientScript : private ClientWorld {
     bool send(Channel channel, const std::string& instance, Frames frames) override {
         Decoded decoded = decode(std::move(frames), Role::server, channel);
         CHECK(bool(decoded), decoded.error().sentence);
-        if (const auto* lease = std::get_if<message::Lease>(&*decoded))
-            if (leases_.size() < k_most_kept) leases_.push_back({std::size_t(instance.back() - '0'), *lease});
+        if (const auto* lease = std::get_if<message::Lease>(&*decoded)) {
+            const auto peer = std::size_t(instance.back() - '0');
+            if (leases_.size() < k_most_kept) leases_.push_back({peer, *lease});
+            if (reachable_) received_.at(peer) = std::max(received_.at(peer), lease->lease);
+        }
         return reachable_;
     }
     void publish(Frames frames) override {
@@ -144,14 +147,17 @@ class ClientScript : private ClientWorld {
         say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, in_.byte(),
                                  own_bits().golden});
     }
-    void ready() {
-        say(in_.below(k_peers), message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});
+    void ready() { say_ready(in_.below(k_peers)); }
+    /// It holds the state and asks for work.
+    void say_ready(std::size_t peer) {
+        say(peer, message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});
+        say(peer, message::Credit{k_session, 2, received_.at(peer)});
     }
-    /// What an honest server says: it holds the state and asks for work.
+    /// What an honest server says.
     void join() {
         const std::size_t peer = in_.below(k_peers);
         say(peer, message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, 1, own_bits().golden});
-        say(peer, message::Ready{k_session, machine_.epoch(), 0, state_hash(machine_.state())});
+        say_ready(peer);
     }
 
     [[nodiscard]] message::Tile tile_of(const message::Lease& lease) const {
@@ -308,6 +314,7 @@ class ClientScript : private ClientWorld {
     int new_states_ = 0;
     std::set<std::uint32_t> processes_;
     std::vector<SentLease> leases_;
+    std::array<LeaseId, k_peers> received_{};  ///< By servers, the last.
     std::vector<BegunRound> rounds_;
     EventStore store_;
     ClientMachine machine_;

@@ -94,8 +94,9 @@ class RelayScript : private RelayWorld {
             CHECK(relay_.below() != nullptr);
             const RenderSettings& settings = relay_.below()->state().settings;
             CHECK((PixelRect{0, 0, settings.width, settings.height}.contains(lease->rect)), lease->rect);
-            if (leases_.size() < k_most_kept)
-                leases_.push_back({std::size_t(instance.back() - '0') % k_peers, *lease, settings.seed});
+            const std::size_t peer = std::size_t(instance.back() - '0') % k_peers;
+            if (leases_.size() < k_most_kept) leases_.push_back({peer, *lease, settings.seed});
+            if (below_hears_) received_[peer] = std::max(received_[peer], lease->lease);
         }
         return below_hears_;
     }
@@ -277,10 +278,12 @@ class RelayScript : private RelayWorld {
                   message::Hello{instance_of(peer), "peer", "0", own_bits().build, 1, 1, own_bits().golden});
         ready(peer);
     }
+    /// It holds the state and asks for work.
     void ready(std::size_t peer) {
         if (!relay_.below()) return;
         const RenderState& state = relay_.below()->state();
         say_below(peer, message::Ready{k_session_below, relay_.below()->epoch(), 0, state_hash(state)});
+        say_below(peer, message::Credit{k_session_below, 2, received_[peer]});
     }
     void hello() {
         const std::size_t peer = in_.below(k_peers);
@@ -390,6 +393,7 @@ class RelayScript : private RelayWorld {
     std::uint32_t epoch_ = 0;
     std::uint64_t sequence_ = 0, last_lease_ = 0;
     std::vector<SentLease> leases_;              ///< To servers.
+    std::array<LeaseId, k_peers> received_{};    ///< By servers, the last.
     std::map<std::uint64_t, GivenLease> given_;  ///< By the client, by number.
     std::optional<std::pair<RenderState, Manifest>> checking_;
     EventStore store_;
@@ -403,7 +407,7 @@ std::vector<std::string> seeds() {
     std::vector<std::string> seeds;
     for (int state = 0; state < int(k_small_states); ++state) {
         std::string honest = "\1\1\1\0"s + std::string{char(state), 3, 1, 1};
-        for (int i = 0; i < 6; ++i) honest += "\2\0\0\0\4\2\0\13"s;
+        for (const char first : {0, 1, 0, 3, 0, 0}) honest += "\2\0\0\0\4\2"s + first + '\13';
         for (int i = 0; i < 40; ++i) honest += "\3\0\1\5\1\0\3"s;
         seeds.push_back(honest);
         seeds.push_back(honest + "\12\1\5\1\0\5\2\0\0\0\4\2\0\5\3\0\1\3\0\1\13\2\0\1\5\1"s);
