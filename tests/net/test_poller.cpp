@@ -54,8 +54,9 @@ TEST_CASE("what comes during a short wait is seen by it or by the next, be it a 
         }
     });
     int heard = 0, rings = 0;
+    // All messages may be heard in one go, before the first ring.
     for (const TimeNs limit = monotonic_now() + testing::k_patience;
-         heard < k_messages && monotonic_now() < limit;) {
+         (heard < k_messages || rings == 0) && monotonic_now() < limit;) {
         const Readable ready = wait_readable({router->pollable(), wake->pollable()}, 999'999);
         if (ready[1]) ++rings, wake->clear();
         if (ready[0])
