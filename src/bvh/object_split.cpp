@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 namespace pathscope {
 namespace {
@@ -11,7 +12,20 @@ struct Bin {
     WideBox box;
     std::uint32_t count = 0;
 };
-using Bins = std::array<std::array<Bin, k_max_split_bins>, 3>;
+
+/// The bins of the three axes. Most sets are small, and would spend more time on emptying all bins than on those that they use.
+class Bins {
+  public:
+    explicit Bins(int count) {
+        for (auto& axis : axes_) std::uninitialized_default_construct_n(axis.begin(), count);
+    }
+    [[nodiscard]] std::array<Bin, k_max_split_bins>& operator[](std::size_t axis) { return axes_[axis]; }
+
+  private:
+    union {
+        std::array<std::array<Bin, k_max_split_bins>, 3> axes_;
+    };
+};
 
 /// Maps centroids to bins, on all axes at once. Finding and applying a split use the same map, so they agree on each side.
 class BinMap {
@@ -97,7 +111,7 @@ std::optional<ObjectSplit> find_object_split(std::span<const Reference> referenc
                                              const ReferenceBounds& bounds, int max_bins) {
     const int count = bins_for(references.size(), max_bins);
     const BinMap map(bounds.centroids, count);
-    Bins bins;
+    Bins bins(count);
     fill(bins, references, map);
     std::optional<ObjectSplit> best;
     for (int axis = 0; axis < 3; ++axis)

@@ -93,7 +93,7 @@ template <class Plane>
     const auto& [x, y, z] = ray.slabs;
     t_near = max(max(near(x), near(y)), max(near(z), ray.t_min));
     const Float8 t_far = min(min(far(x), far(y)), min(far(z), broadcast(t_max)));
-    return at_most(t_near, t_far * broadcast(k_far_stretch));
+    return at_most(t_near, t_far);
 }
 
 /// Whether any ray meets the box, whose planes lie k_wide floats apart, before the hit that it has.
@@ -112,7 +112,7 @@ template <class Plane>
                 max(slab.mixed ? min(at(slab.near, near), at(slab.far, near)) : at(slab.near, near), t_near);
             t_far = min(slab.mixed ? max(at(slab.near, far), at(slab.far, far)) : at(slab.far, far), t_far);
         }
-        if (any(at_most(t_near, t_far * broadcast16(k_far_stretch)))) return true;
+        if (any(at_most(t_near, t_far))) return true;
     }
     return false;
 }

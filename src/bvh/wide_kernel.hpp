@@ -22,7 +22,7 @@ inline namespace PATHSCOPE_SIMD {
 /// by 2^-20 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
 struct WideBoxRay {
     struct Slab {
-        Float8 near_offset, far_offset, near_inverse, far_inverse;
+        Float8 near_offset, far_offset, inverse;
         std::size_t near, far;  ///< Where the planes lie in WideNode::bounds, in floats.
     };
     Slab x, y, z;
@@ -35,13 +35,8 @@ struct WideBoxRay {
     static Slab slab(const BoxRay& ray, int axis, SlabPlanes planes) {
         const float most = 0x1p24f * min_component(abs(ray.inverse));
         const float inverse = std::max(std::min(ray.inverse[axis], most), -most);
-        const float stretched = inverse * k_far_stretch;
-        return {broadcast(-ray.near_origin[axis] * inverse),
-                broadcast(-ray.far_origin[axis] * stretched),
-                broadcast(inverse),
-                broadcast(stretched),
-                planes.near * k_wide,
-                planes.far * k_wide};
+        return {broadcast(-ray.near_origin[axis] * inverse), broadcast(-ray.far_origin[axis] * inverse),
+                broadcast(inverse), planes.near * k_wide, planes.far * k_wide};
     }
 };
 
@@ -50,13 +45,13 @@ struct WideBoxRay {
                                               Float8& t_near) {
     const float* const planes = node.bounds[0].data();
     const auto near = [&](const WideBoxRay::Slab& slab) {
-        return about_multiply_add(load(planes + slab.near), slab.near_inverse, slab.near_offset);
+        return about_multiply_add(load(planes + slab.near), slab.inverse, slab.near_offset);
     };
     const auto far = [&](const WideBoxRay::Slab& slab) {
-        return about_multiply_add(load(planes + slab.far), slab.far_inverse, slab.far_offset);
+        return about_multiply_add(load(planes + slab.far), slab.inverse, slab.far_offset);
     };
     t_near = max(max(near(ray.x), near(ray.y)), max(near(ray.z), ray.t_min));
-    const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max * k_far_stretch)));
+    const Float8 t_far = min(min(far(ray.x), far(ray.y)), min(far(ray.z), broadcast(t_max)));
     return at_most(t_near, t_far);
 }
 
@@ -158,10 +153,9 @@ class WideStack {
 
     /// The next child that begins before t_max; false if there is none left.
     [[nodiscard]] bool pop_before(float t_max, std::uint32_t& child) {
-        const float limit = t_max * k_far_stretch;
         while (size_ > 0) {
             const Entry next = entries_[--size_];
-            if (std::bit_cast<float>(static_cast<std::uint32_t>(next >> 32)) > limit) continue;
+            if (std::bit_cast<float>(static_cast<std::uint32_t>(next >> 32)) > t_max) continue;
             child = child_of(next);
             return true;
         }

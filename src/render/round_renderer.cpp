@@ -1,11 +1,10 @@
 #include "pathscope/render/round_renderer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <span>
 
 #include "pathscope/core/parallel_for.hpp"
-#include "pathscope/integrator/both_parts.hpp"
+#include "pathscope/integrator/path_batch.hpp"
 
 namespace pathscope {
 namespace {
@@ -19,37 +18,6 @@ struct RowResult {
 
 bool is_radiance(Rgb value) { return is_finite(value) && min_component(value) >= 0; }
 
-/// Some samples of a row, pixel by pixel, whose camera rays are traced together: they are close to each other.
-class CameraPacket {
-  public:
-    struct Sample {
-        int x;
-        std::uint32_t number;
-        PixelSampler sampler;
-    };
-
-    [[nodiscard]] bool full() const { return samples_.size() == k_packet_rays; }
-    void add(int x, std::uint32_t number, const PixelSampler& sampler, const Ray& ray) {
-        samples_.push_back({x, number, sampler});
-        rays_.push_back(ray);
-    }
-
-    /// Calls finish(sample, its ray and hit) for each; then the packet is empty.
-    template <class Finish>
-    void trace(const Scene& scene, WorkCounter* work_done, Finish finish) {
-        std::array<std::optional<SceneHit>, k_packet_rays> hits;
-        intersect(scene, rays_, std::span(hits).first(rays_.size()));
-        for (std::size_t i = 0; i < samples_.size(); ++i) finish(samples_[i], TracedRay{rays_[i], hits[i]});
-        if (work_done) work_done->fetch_add(samples_.size(), std::memory_order_relaxed);
-        samples_.clear();
-        rays_.clear();
-    }
-
-  private:
-    std::vector<Sample> samples_;
-    std::vector<Ray> rays_;
-};
-
 /// What a row is rendered from.
 struct RowTask {
     const Scene& scene;
@@ -60,6 +28,12 @@ struct RowTask {
     int y;
 };
 
+/// Which sample of the row.
+struct RowSample {
+    int x;
+    std::uint32_t number;
+};
+
 /// The sums and the account of one part of a row.
 class RowSums {
   public:
@@ -68,7 +42,7 @@ class RowSums {
         sums_ = &result.sums[row * std::size_t(task.round.rect.width)];
     }
 
-    void add(const CameraPacket::Sample& sample, Rgb radiance) {
+    void add(const RowSample& sample, Rgb radiance) {
         if (!is_radiance(radiance)) {
             row_.dropped.push_back({std::uint32_t(sample.x), std::uint32_t(task_.y), sample.number});
             return;
@@ -87,28 +61,35 @@ class RowSums {
     RowResult row_;
 };
 
-/// Calls finish(sample, its camera ray and hit) for each sample of the row.
+/// Calls finish(sample, its radiance) for each sample of the row, pixel by pixel.
 template <class Finish>
-void each_sample(const RowTask& task, Finish finish) {
+void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finish finish) {
     const auto& [scene, camera, settings, round, work_done, y] = task;
-    CameraPacket packet;
+    PathBatch batch(scene, settings.transport, parts);
+    std::vector<RowSample> samples;
+    const auto trace_batch = [&] {
+        const std::span<const PartsRadiance> radiance = batch.trace(rays);
+        for (std::size_t i = 0; i < samples.size(); ++i) finish(samples[i], radiance[i]);
+        if (work_done) work_done->fetch_add(samples.size(), std::memory_order_relaxed);
+        samples.clear();
+    };
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
-        for (std::uint32_t sample = round.first; sample < round.first + round.count; ++sample) {
-            const PixelSampler sampler(settings.transport.sampler, settings.seed, x, y, sample);
-            packet.add(x, sample, sampler, camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension)));
-            if (packet.full()) packet.trace(scene, work_done, finish);
+        for (std::uint32_t number = round.first; number < round.first + round.count; ++number) {
+            const PixelSampler sampler(settings.transport.sampler, settings.seed, x, y, number);
+            samples.push_back({x, number});
+            batch.add(camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension)), sampler);
+            if (batch.full()) trace_batch();
         }
-    packet.trace(scene, work_done, finish);
+    if (!samples.empty()) trace_batch();
 }
 
-template <LightPart part>
-RowResult render_row(const RowTask& task, RoundResult& result) {
+RowResult render_row(const RowTask& task, LightPart part, RoundResult& result) {
     RowSums sums(task, result);
-    each_sample(task, [&](const CameraPacket::Sample& sample, const TracedRay& first) {
-        ++sums.rays();
-        sums.add(sample, estimate_radiance<part>(task.scene, task.settings.transport, first, sample.sampler,
-                                                 sums.rays()));
-    });
+    const bool direct = part == LightPart::direct;
+    trace_row(task, {direct, !direct}, sums.rays(),
+              [&](const RowSample& sample, const PartsRadiance& radiance) {
+                  sums.add(sample, direct ? radiance.direct : radiance.indirect);
+              });
     return sums.take();
 }
 
@@ -118,13 +99,11 @@ struct PartsRow {
 
 PartsRow render_parts_row(const RowTask& task, PartsResult& result) {
     RowSums direct(task, result.direct), indirect(task, result.indirect);
-    each_sample(task, [&](const CameraPacket::Sample& sample, const TracedRay& first) {
-        ++indirect.rays();
-        const PartsRadiance radiance =
-            estimate_both_parts(task.scene, task.settings.transport, first, sample.sampler, indirect.rays());
-        direct.add(sample, radiance.direct);
-        indirect.add(sample, radiance.indirect);
-    });
+    trace_row(task, {true, true}, indirect.rays(),
+              [&](const RowSample& sample, const PartsRadiance& radiance) {
+                  direct.add(sample, radiance.direct);
+                  indirect.add(sample, radiance.indirect);
+              });
     return {direct.take(), indirect.take()};
 }
 
@@ -169,10 +148,7 @@ std::optional<RoundResult> render_round(const Scene& scene, const Camera& camera
                                         int threads, const CancelFlag* cancelled, WorkCounter* work_done) {
     RoundResult result = empty_result(round);
     std::vector<RowResult> rows;
-    const auto render = [&](const RowTask& task) {
-        return part == LightPart::direct ? render_row<LightPart::direct>(task, result)
-                                         : render_row<LightPart::indirect>(task, result);
-    };
+    const auto render = [&](const RowTask& task) { return render_row(task, part, result); };
     if (!render_rows(scene, camera, settings, round, threads, cancelled, work_done, rows, render))
         return std::nullopt;
     for (const RowResult& row : rows) append(result, row);

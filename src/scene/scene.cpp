@@ -1,5 +1,6 @@
 #include "pathscope/scene/scene.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "lookup.hpp"
@@ -61,6 +62,12 @@ void complete_hit(const Scene& scene, const Ray& ray, const std::optional<Hit>& 
     }
 }
 
+bool meets_sphere(const Scene& scene, const Ray& ray) {
+    return std::ranges::any_of(scene.spheres, [&](const Sphere& sphere) {
+        return intersect_sphere(ray, sphere.centre, sphere.radius).has_value();
+    });
+}
+
 /// The holes of cut-outs, for a traversal. Scenes without any need not ask.
 struct Solid {
     const Scene& scene;
@@ -109,10 +116,15 @@ std::optional<SceneHit> intersect(const Scene& scene, const Ray& ray, TraversalC
 }
 
 bool occluded(const Scene& scene, const Ray& ray) {
-    if (has_cutouts(scene) ? any_hit(scene.tree, ray, Solid{scene}) : any_hit(scene.tree, ray)) return true;
-    for (const Sphere& sphere : scene.spheres)
-        if (intersect_sphere(ray, sphere.centre, sphere.radius)) return true;
-    return false;
+    const bool by_mesh =
+        has_cutouts(scene) ? any_hit(scene.tree, ray, Solid{scene}) : any_hit(scene.tree, ray);
+    return by_mesh || meets_sphere(scene, ray);
+}
+
+bool occluded(const Scene& scene, const Ray& ray, OccluderCache& occluders) {
+    const bool by_mesh = has_cutouts(scene) ? any_hit(scene.tree, ray, Solid{scene}, occluders)
+                                            : any_hit(scene.tree, ray, AcceptAll{}, occluders);
+    return by_mesh || meets_sphere(scene, ray);
 }
 
 Rgb emitted_radiance(const Scene& scene, const SceneHit& hit, Vec3 outgoing) {

@@ -5,19 +5,19 @@
 ///
 ///     t_near_i = (near plane_i - o_i) / d_i    and    t_far_i = (far plane_i - o_i) / d_i
 ///
-/// and in the box where all three intervals overlap. Three traps, and the ways around them:
+/// and in the box where all three intervals overlap. Two traps, and the ways around them:
 ///
 /// - Rounding. Each t is off by three roundings, up to 3 * 2^-24 of itself: a ray through an edge of the box, or
-///   along a face of a flat one, can fall between near and far. So far is stretched by 1 + 2^-21.
-/// - The triangle test (geometry/triangle.hpp) has an error of its own, up to 9 * 2^-24 of the distances along an axis, by
-///   which a hit may stick out of its box. So the origin is moved, towards the near planes for t_near and away from the
-///   far ones for t_far, by 2^-20 of the scene and a few ulps of its own, lest the sum be rounded away.
+///   along a face of a flat one, can fall between near and far. And the triangle test (geometry/triangle.hpp) has an error
+///   of its own, up to 11.5 * 2^-24 of the distances along an axis, by which a hit may stick out of its box. So the origin is
+///   moved, towards the near planes for t_near and away from the far ones for t_far, by 16 * 2^-24 of the scene, and a few
+///   ulps of its own, lest the sum be rounded away.
 /// - Division by zero. A direction component of 0 has an infinite inverse, and 0 * infinity is NaN where the origin is
 ///   on a plane. The moved origin is not: where the origin is on the border of the slab, it is inside, and the products
 ///   are -infinity and +infinity.
 ///
 /// Ensures: if intersect_triangle() reports a hit at t for a triangle inside the box, and t is in [t_min, t_max], then
-/// the box is met, with t_near <= t * (1 + 2^-21). This is what makes the closest hit independent of the tree.
+/// the box is met, with t_near <= t. This is what makes the closest hit independent of the tree.
 /// Thread safety: pure.   Source: Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2); the moved origin is
 /// that of Woop, Benthin, Wald 2013.
 /// Test: tests/bvh/test_box_ray.cpp
@@ -31,8 +31,6 @@
 #include "pathscope/math/ray.hpp"
 
 namespace pathscope {
-
-inline constexpr float k_far_stretch = 1 + 0x1p-21f;
 
 /// By how much boxes are widened, as a share of the scene's reach from the ray's origin.
 inline constexpr float k_box_widening = 0x1p-20f;
@@ -84,7 +82,7 @@ struct BoxInterval {
     const float far_y = (bounds[ray.y.far] - ray.far_origin.y) * ray.inverse.y;
     const float far_z = (bounds[ray.z.far] - ray.far_origin.z) * ray.inverse.z;
     return {std::max(std::max(near_x, near_y), std::max(near_z, t_min)),
-            std::min(std::min(far_x, far_y), std::min(far_z, t_max)) * k_far_stretch};
+            std::min(std::min(far_x, far_y), std::min(far_z, t_max))};
 }
 
 }  // namespace pathscope

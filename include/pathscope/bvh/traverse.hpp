@@ -45,7 +45,7 @@ class TraversalStack {
     [[nodiscard]] std::optional<std::uint32_t> pop(float t_max, Probe& probe) {
         while (size_ > 0) {
             const auto [node, t_near] = entries_[--size_];
-            if (t_near <= t_max * k_far_stretch) return node;
+            if (t_near <= t_max) return node;
             probe.drop_node(node, t_near);
         }
         return std::nullopt;

@@ -74,4 +74,11 @@ template <class Accept = AcceptAll>
     return any_hit(*std::get_if<Bvh>(&tree), ray, accept);
 }
 
+/// any_hit(tree, ray, accept), sooner where rays before it were stopped by the same things: wide_traverse.hpp.
+template <class Accept>
+[[nodiscard]] bool any_hit(const Tree& tree, const Ray& ray, const Accept& accept, OccluderCache& occluders) {
+    if (const auto* wide = std::get_if<WideBvh>(&tree)) return any_hit(*wide, ray, accept, occluders);
+    return any_hit(*std::get_if<Bvh>(&tree), ray, accept);
+}
+
 }  // namespace pathscope

@@ -29,39 +29,48 @@ namespace pathscope {
     return std::min(2, int(scene.lights.lights.size()));
 }
 
-/// One of the light samples at a vertex: f Le V cos / p_l, with its MIS weight, and divided by their number.
-[[nodiscard]] inline Rgb one_light_sample(const Scene& scene, const TransportSettings& settings,
-                                          const Vertex& vertex, int count, float u_pick, Vec2 u_point,
-                                          std::uint64_t& rays) {
-    const std::optional<LightSample> light =
-        sample_light(scene, settings.light, vertex.light_reference(), u_pick, u_point);
-    if (!light || !is_consistent(vertex.side, light->direction)) return {};
+/// What a light sample brings if its ray meets nothing: f Le / p_l, with its MIS weight, and divided by the number of samples.
+struct UnshadowedLight {
+    Ray ray;
+    Rgb radiance;
+};
+
+/// Number i of the light samples at a vertex; nothing if no light can come from there. They are a lattice of `count` points, turned
+/// by one random shift: so two samples of sun and sky, or of two lamps, are one of each, and of more lights they are at least
+/// spread. Requires: !vertex.specular.
+[[nodiscard]] inline std::optional<UnshadowedLight> unshadowed_light(const Scene& scene,
+                                                                     const TransportSettings& settings,
+                                                                     const Vertex& vertex,
+                                                                     const BounceSample& random, int i,
+                                                                     int count) {
+    const float shift = float(i) / float(count);
+    const auto turned = [shift](float u) { return u + shift - std::floor(u + shift); };
+    const Vec2 u = random.light_point();
+    const std::optional<LightSample> light = sample_light(scene, settings.light, vertex.light_reference(),
+                                                          turned(random.light_pick()), {turned(u.x), u.y});
+    if (!light || !is_consistent(vertex.side, light->direction)) return std::nullopt;
 
     const Vec3 incoming = vertex.side.frame.to_local(light->direction);
     const BsdfValue bsdf = eval_bsdf_and_pdf(settings.hemisphere, vertex.seen, incoming);
-    if (is_zero(bsdf.value)) return {};
-    ++rays;
-    if (occluded(scene, shadow_ray(vertex.point, *light))) return {};
+    if (is_zero(bsdf.value)) return std::nullopt;
 
     const float density = float(count) * light->pdf_solid_angle;
     const float weight = light->delta ? 1.0f : mis_weight(settings.mis, density, bsdf.pdf_solid_angle);
-    return bsdf.value * light->radiance * (std::abs(incoming.z) * weight / density);
+    return UnshadowedLight{shadow_ray(vertex.point, *light),
+                           bsdf.value * light->radiance * (std::abs(incoming.z) * weight / density)};
 }
 
-/// Light at the vertex: a lattice of n points, turned by one random shift. So two samples of sun and sky, or of two lamps, are one of
-/// each, and of more lights they are at least spread. Requires: !vertex.specular.
+/// Light at the vertex. Requires: !vertex.specular.
 [[nodiscard]] inline Rgb sample_direct_light(const Scene& scene, const TransportSettings& settings,
                                              const Vertex& vertex, const BounceSample& random,
                                              std::uint64_t& rays) {
-    const float u_pick = random.light_pick();
-    const Vec2 u_point = random.light_point();
     const int count = light_sample_count(scene, settings);
     Rgb sum;
     for (int i = 0; i < count; ++i) {
-        const float shift = float(i) / float(count);
-        const auto turned = [shift](float u) { return u + shift - std::floor(u + shift); };
-        sum += one_light_sample(scene, settings, vertex, count, turned(u_pick),
-                                {turned(u_point.x), u_point.y}, rays);
+        const auto light = unshadowed_light(scene, settings, vertex, random, i, count);
+        if (!light) continue;
+        ++rays;
+        if (!occluded(scene, light->ray)) sum += light->radiance;
     }
     return sum;
 }

@@ -13,6 +13,7 @@
 #include "pathscope/geometry/spawn.hpp"
 #include "pathscope/integrator/settings.hpp"
 #include "pathscope/sampling/sampler.hpp"
+#include "pathscope/sampling/sampler_batch.hpp"
 #include "pathscope/scene/light_sampling.hpp"
 #include "pathscope/scene/scene.hpp"
 #include "pathscope/scene/surface.hpp"
@@ -27,22 +28,36 @@ inline constexpr std::uint32_t k_pixel_dimension = 0;
 /// pass plays no roulette) leaves the others as they are. The four that nearly every vertex needs are made together.
 class BounceSample {
   public:
+    static constexpr std::uint32_t k_decisions = 5;
+    [[nodiscard]] static std::uint32_t first_dimension(int bounce) {
+        return 1 + k_decisions * std::uint32_t(bounce);
+    }
+
     BounceSample(const PixelSampler& sampler, int bounce)
         : sampler_(&sampler),
-          base_(1 + k_decisions * std::uint32_t(bounce)),
-          pairs_(sampler.get_four_2d(base_)) {}
+          roulette_dimension_(first_dimension(bounce) + 4),
+          pairs_(sampler.get_four_2d(first_dimension(bounce))) {}
+
+    /// Of numbers that were made for many samples, from first_dimension() on.
+    BounceSample(const PairRows<k_decisions>& rows, std::size_t sample) : roulette_(rows.x[4][sample]) {
+        for (std::size_t i = 0; i < 4; ++i) {
+            pairs_.x[i] = rows.x[i][sample];
+            pairs_.y[i] = rows.y[i][sample];
+        }
+    }
 
     [[nodiscard]] float light_pick() const { return pairs_.x[0]; }
     [[nodiscard]] Vec2 light_point() const { return pairs_[1]; }
     [[nodiscard]] float lobe() const { return pairs_.x[2]; }
     [[nodiscard]] Vec2 direction() const { return pairs_[3]; }
-    [[nodiscard]] float roulette() const { return sampler_->get_1d(base_ + 4); }
+    [[nodiscard]] float roulette() const {
+        return sampler_ != nullptr ? sampler_->get_1d(roulette_dimension_) : roulette_;
+    }
 
   private:
-    static constexpr std::uint32_t k_decisions = 5;
-
-    const PixelSampler* sampler_;
-    std::uint32_t base_;
+    const PixelSampler* sampler_ = nullptr;  // Asked for the number that few vertices need.
+    std::uint32_t roulette_dimension_ = 0;
+    float roulette_ = 0;
     FourPairs pairs_;
 };
 

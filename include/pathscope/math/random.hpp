@@ -13,11 +13,14 @@
 
 namespace pathscope {
 
-/// Four 32-bit numbers for one instruction: what is written for one number can be asked for four.
+/// 32-bit numbers for one instruction: what is written for one number can be asked for many.
 using FourBits = std::uint32_t __attribute__((vector_size(16)));
+using EightBits = std::uint32_t __attribute__((vector_size(32)));
+using SixteenBits = std::uint32_t __attribute__((vector_size(64)));
 
 template <class T>
-concept Bits = std::same_as<T, std::uint32_t> || std::same_as<T, FourBits>;
+concept Bits = std::same_as<T, std::uint32_t> || std::same_as<T, FourBits> || std::same_as<T, EightBits> ||
+    std::same_as<T, SixteenBits>;
 
 /// A bijection of 32-bit numbers that spreads each input bit over all output bits.
 template <Bits T>

@@ -46,7 +46,7 @@ using WorkCounter = std::atomic<std::uint64_t>;
                                                       const CancelFlag* cancelled = nullptr,
                                                       WorkCounter* work_done = nullptr);
 
-/// Both parts of a round, by walks that the two share (integrator/both_parts.hpp): the sums of render_round(), bit by bit.
+/// Both parts of a round, by walks that the two share (integrator/path_batch.hpp): the sums of render_round(), bit by bit.
 struct PartsResult {
     RoundResult direct;  ///< Its rays are counted in `indirect`.
     RoundResult indirect;

@@ -97,48 +97,59 @@ class PixelSampler {
               std::uint32_t(y))) {}
 
     [[nodiscard]] float get_1d(std::uint32_t dimension) const {
-        return to_unit_float(pair(hash_combine(pixel_key_, dimension)).first);
+        return to_unit_float(pair(kind_, seed(), dimension).first);
     }
 
     [[nodiscard]] Vec2 get_2d(std::uint32_t dimension) const {
-        const auto bits = pair(hash_combine(pixel_key_, dimension));
+        const auto bits = pair(kind_, seed(), dimension);
         return {to_unit_float(bits.first), to_unit_float(bits.second)};
     }
 
     /// get_2d(first), ... get_2d(first + 3), for the price of one and a half.
     [[nodiscard]] FourPairs get_four_2d(std::uint32_t first) const {
-        const FourBits dimensions = FourBits{0, 1, 2, 3} + first;
-        const auto bits = pair(hash_combine(FourBits{} + pixel_key_, dimensions));
+        const Seed<FourBits> four{FourBits{} + pixel_key_, FourBits{} + sample_,
+                                  FourBits{} + reversed_sample_};
+        const auto bits = pair(kind_, four, FourBits{0, 1, 2, 3} + first);
         FourPairs pairs;
         for (std::size_t i = 0; i < 4; ++i) pairs.x[i] = to_unit_float(bits.first[i]);
         for (std::size_t i = 0; i < 4; ++i) pairs.y[i] = to_unit_float(bits.second[i]);
         return pairs;
     }
 
-  private:
-    static constexpr std::uint32_t k_sequence_salt = 0x9e3779b1u;
-    static constexpr std::uint32_t k_second_salt = 0x68bc21ebu;
-    static constexpr std::uint32_t k_first_salt = 0x02e5be93u;
+    [[nodiscard]] SamplerKind kind() const { return kind_; }
+
+    /// What the numbers are made of, of one sample or of many.
+    template <Bits T>
+    struct Seed {
+        T pixel_key, sample, reversed_sample;
+    };
+    [[nodiscard]] Seed<std::uint32_t> seed() const { return {pixel_key_, sample_, reversed_sample_}; }
 
     template <Bits T>
     struct Pair {
         T first, second;
     };
-
-    /// The pair of one dimension, or those of four, by the key made from pixel and dimension.
+    /// The bits of get_2d(dimension): the upper 24 of each are the number.
     template <Bits T>
-    [[nodiscard]] Pair<T> pair(T key) const {
-        if (kind_ == SamplerKind::independent) {
-            const T first = hash_combine(key, T{} + sample_);
+    [[nodiscard]] static Pair<T> pair(SamplerKind kind, const Seed<T>& seed,
+                                      std::type_identity_t<T> dimension) {
+        const T key = hash_combine(seed.pixel_key, dimension);
+        if (kind == SamplerKind::independent) {
+            const T first = hash_combine(key, seed.sample);
             return {first, hash_combine(first, T{} + k_second_salt)};
         }
         // Permutes the samples so that the first 2^k of them stay an aligned run of the sequence, for every k.
-        const T index = reverse_bits(scramble_reversed(T{} + reversed_sample_, key));
+        const T index = reverse_bits(scramble_reversed(seed.reversed_sample, key));
         const auto scrambled = [&](T reversed, std::uint32_t salt) {
             return reverse_bits(scramble_reversed(reversed, hash_combine(key, T{} + salt)));
         };
         return {scrambled(index, k_first_salt), scrambled(sobol_second_reversed(index), k_second_salt)};
     }
+
+  private:
+    static constexpr std::uint32_t k_sequence_salt = 0x9e3779b1u;
+    static constexpr std::uint32_t k_second_salt = 0x68bc21ebu;
+    static constexpr std::uint32_t k_first_salt = 0x02e5be93u;
 
     SamplerKind kind_;
     std::uint32_t sample_, reversed_sample_;

@@ -85,6 +85,9 @@ void intersect(const Scene& scene, const Ray& ray, std::optional<SceneHit>& hit)
 /// Whether anything lies in [t_min, t_max] of the ray.
 [[nodiscard]] bool occluded(const Scene& scene, const Ray& ray);
 
+/// The same, sooner for rays of neighbouring points towards the same lights (bvh/occluder_cache.hpp).
+[[nodiscard]] bool occluded(const Scene& scene, const Ray& ray, OccluderCache& occluders);
+
 /// hits[i] = intersect(scene, rays[i]), bit by bit, and faster for rays of neighbouring pixels. Requires: at most
 /// k_packet_rays of them, as many places in hits.
 void intersect(const Scene& scene, std::span<const Ray> rays, std::span<std::optional<SceneHit>> hits);

@@ -1,4 +1,4 @@
-#include "pathscope/integrator/both_parts.hpp"
+#include "pathscope/integrator/path_batch.hpp"
 
 #include "integrator/estimator_scenes.hpp"
 
@@ -43,32 +43,52 @@ struct Tally {
     std::uint64_t rays_apart = 0, rays_together = 0;
 };
 
-/// Compares every sample of a small picture, bit by bit.
+/// Compares every sample of a small picture, bit by bit: both parts of a batch, and each part alone.
 Tally compare(const Scene& scene, const TransportSettings& settings, int samples) {
     Tally tally;
     const int size = 8;
+    PathBatch both(scene, settings, {true, true}), direct_only(scene, settings, {true, false}),
+        indirect_only(scene, settings, {false, true});
+    std::uint64_t rays_direct = 0, rays_indirect = 0;
+    std::vector<PartsRadiance> expected;
+    const auto check_batch = [&] {
+        const auto together = both.trace(tally.rays_together);
+        const auto direct = direct_only.trace(rays_direct), indirect = indirect_only.trace(rays_indirect);
+        REQUIRE(together.size() == expected.size());
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+            REQUIRE(together[i].direct == expected[i].direct);
+            REQUIRE(together[i].indirect == expected[i].indirect);
+            REQUIRE(direct[i].direct == expected[i].direct);
+            REQUIRE(direct[i].indirect == Rgb{});
+            REQUIRE(indirect[i].direct == Rgb{});
+            REQUIRE(indirect[i].indirect == expected[i].indirect);
+        }
+        expected.clear();
+    };
     for (int i = 0; i < size * size; ++i)
         for (int sample = 0; sample < samples; ++sample) {
             const int x = i % size, y = i / size;
             const PixelSampler sampler(settings.sampler, 5, x, y, std::uint32_t(sample));
             const TracedRay first = trace(scene, room_ray(x, y, size, sampler));
-            const Rgb direct =
-                estimate_radiance<LightPart::direct>(scene, settings, first, sampler, tally.rays_apart);
-            const Rgb indirect =
-                estimate_radiance<LightPart::indirect>(scene, settings, first, sampler, tally.rays_apart);
-            const PartsRadiance both =
-                estimate_both_parts(scene, settings, first, sampler, tally.rays_together);
-            REQUIRE(both.direct == direct);
-            REQUIRE(both.indirect == indirect);
-            tally.lit_direct += !is_zero(direct);
-            tally.lit_indirect += !is_zero(indirect);
+            tally.rays_apart += 2;
+            expected.push_back(
+                {estimate_radiance<LightPart::direct>(scene, settings, first, sampler, tally.rays_apart),
+                 estimate_radiance<LightPart::indirect>(scene, settings, first, sampler, tally.rays_apart)});
+            tally.lit_direct += !is_zero(expected.back().direct);
+            tally.lit_indirect += !is_zero(expected.back().indirect);
+            for (PathBatch* batch : {&both, &direct_only, &indirect_only}) batch->add(first.ray, sampler);
+            if (both.full()) check_batch();
         }
+    if (!expected.empty()) check_batch();
+    CHECK(rays_direct + rays_indirect == tally.rays_apart);
     return tally;
 }
 
 }  // namespace
 
-TEST_CASE("both parts by one walk are the parts one by one, to the last bit, with every lever") {
+TEST_CASE(
+    "samples side by side, both parts or one, are the samples one by one, to the last bit, with every "
+    "lever") {
     const Scene room = small_room(), mirrors = hall_of_mirrors(), box = furnace(0.5f, 0.8f);
     for (const Scene* scene : {&room, &mirrors, &box})
         for (const TransportSettings& settings : all_levers()) {
