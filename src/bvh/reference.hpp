@@ -39,6 +39,7 @@ struct WideBox {
         store(b, high);
         return {{a[0], a[1], a[2]}, {b[0], b[1], b[2]}};
     }
+    [[nodiscard]] bool empty() const { return box().empty(); }
     /// 0 for an empty one.
     [[nodiscard]] float half_area() const { return box().half_area(); }
 };

@@ -21,6 +21,7 @@ inline void store(float* four, Float4 a) { _mm_store_ps(four, a.lanes); }
 [[nodiscard]] inline Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float4 min(Float4 a, Float4 b) { return {_mm_min_ps(a.lanes, b.lanes)}; }
 [[nodiscard]] inline Float4 max(Float4 a, Float4 b) { return {_mm_max_ps(a.lanes, b.lanes)}; }
+[[nodiscard]] inline Float4 magnitude(Float4 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.lanes)}; }
 /// With 0 in the fourth lane.
 [[nodiscard]] inline Float4 first_three(Float4 a) { return {_mm_blend_ps(a.lanes, _mm_setzero_ps(), 8)}; }
 /// Towards zero. Requires: |a| < 2^31.
@@ -64,6 +65,9 @@ inline void store(float* four, Float4 a) {
 }
 [[nodiscard]] inline Float4 max(Float4 a, Float4 b) {
     return lanewise::each(a, b, [](float x, float y) { return x > y ? x : y; });
+}
+[[nodiscard]] inline Float4 magnitude(Float4 a) {
+    return lanewise::each(a, a, [](float x, float) { return std::abs(x); });
 }
 [[nodiscard]] inline Float4 first_three(Float4 a) { return {{a.lanes[0], a.lanes[1], a.lanes[2], 0}}; }
 [[nodiscard]] inline std::array<std::int32_t, 4> truncate(Float4 a) {
