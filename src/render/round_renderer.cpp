@@ -67,18 +67,26 @@ void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finis
     const auto& [scene, camera, settings, round, work_done, y] = task;
     PathBatch batch(scene, settings.transport, parts);
     std::vector<RowSample> samples;
+    std::vector<PixelSampler> samplers;
+    SamplerBatch seeds;
+    PairRows<1> places;  // Within the pixel.
     const auto trace_batch = [&] {
+        get_2d(seeds, k_pixel_dimension, places);
+        for (std::size_t i = 0; i < samples.size(); ++i)
+            batch.add(camera_ray(camera, samples[i].x, y, {places.x[0][i], places.y[0][i]}), samplers[i]);
         const std::span<const PartsRadiance> radiance = batch.trace(rays);
         for (std::size_t i = 0; i < samples.size(); ++i) finish(samples[i], radiance[i]);
         if (work_done) work_done->fetch_add(samples.size(), std::memory_order_relaxed);
         samples.clear();
+        samplers.clear();
+        seeds.size = 0;
     };
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t number = round.first; number < round.first + round.count; ++number) {
-            const PixelSampler sampler(settings.transport.sampler, settings.seed, x, y, number);
             samples.push_back({x, number});
-            batch.add(camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension)), sampler);
-            if (batch.full()) trace_batch();
+            samplers.emplace_back(settings.transport.sampler, settings.seed, x, y, number);
+            seeds.add(samplers.back());
+            if (samples.size() == PathBatch::k_capacity) trace_batch();
         }
     if (!samples.empty()) trace_batch();
 }

@@ -254,6 +254,7 @@ void finish_light_table(LightTable& table, float scene_radius,
 std::optional<LightPick> pick_light(const LightTable& table, LightSampling sampling,
                                     const LightReference& reference, float u) {
     if (table.empty()) return std::nullopt;
+    if (table.lights.size() == 1) return LightPick{0, 1};
     sampling = in_effect(table, sampling);
     if (sampling == LightSampling::tree) return pick_by_tree(table, reference, u);
     const Distribution1d& pick = table.pick[std::size_t(sampling)];
@@ -263,6 +264,7 @@ std::optional<LightPick> pick_light(const LightTable& table, LightSampling sampl
 
 float pick_probability(const LightTable& table, LightSampling sampling, const LightReference& reference,
                        std::uint32_t light) {
+    if (table.lights.size() == 1) return 1;
     sampling = in_effect(table, sampling);
     return sampling == LightSampling::tree ? tree_probability(table, reference, light)
                                            : pick_probability(table, sampling, light);
