@@ -20,6 +20,12 @@ std::string shown(std::string_view word) {
     return std::string(word.substr(0, 40)) + (word.size() > 40 ? "..." : "");
 }
 
+/// Whether a number that is finite, like 0e999, is none to tinyobjloader, which multiplies by powers of ten.
+bool has_huge_exponent(std::string_view word) {
+    const std::size_t e = word.find_first_of("eE");
+    return e != std::string_view::npos && number_of(word.substr(e + 1)).value_or(0) > 300;
+}
+
 class ObjChecker {
   public:
     ObjChecker(std::string& text, const std::vector<std::size_t>& joined, const std::string& shown_path)
@@ -113,6 +119,9 @@ class ObjChecker {
             finite = finite && std::abs(*number) <= k_largest;
             if (!finite && must_be_finite)
                 fail(fmt::format("\"{}\" is not a finite number; export the mesh again without it.",
+                                 shown(word)));
+            if (finite && has_huge_exponent(word))
+                fail(fmt::format("\"{}\" has a larger exponent than is read; write the number without it.",
                                  shown(word)));
         }
         return finite;

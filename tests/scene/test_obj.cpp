@@ -196,6 +196,8 @@ TEST_CASE("what is wrong with an OBJ is one sentence with file and line") {
         {"v 0 0 0\r\n\r\nv 0 0 -inf\r\n", "a.obj:3: \"-inf\" is not a finite number"},
         {"v 0 0 0\r\rv 0 0 1e39\r", "a.obj:3: \"1e39\" is not a finite number"},
         {"v 0 0 1e999\n", "a.obj:1: \"1e999\" is not a finite number"},
+        {"v 0 0 0e999\n", "a.obj:1: \"0e999\" has a larger exponent than is read"},
+        {"v 0 0 0\nvn 0 0E+301 1\n", "a.obj:2: \"0E+301\" has a larger exponent than is read"},
         {k_square + "vt nan 0\n", "a.obj:5: \"nan\" is not a finite number"},
         {k_square + "vn 0 x 0\n", "a.obj:5: \"x\" is not a number"},
         {k_square + "f 1 2 3\nf 1 2\n", "a.obj:6: a face needs at least three corners and has 2"},
