@@ -120,8 +120,11 @@ void RelayMachine::on_checked(CheckedScene& checked, TimeNs now) {
         LoadedScene loaded{std::move(checked.state), checked.depot.error()};
         return above_.on_loaded(loaded, now_);
     }
+    // The client may go back to the scene that is here, however many others it asked for in between.
+    std::erase_if(depots_, [&](const auto& depot) {
+        return depot.first == checked.state.files || !above_.has_scene(depot.first);
+    });
     depots_.emplace_back(checked.state.files, std::move(*checked.depot));
-    if (depots_.size() > 2) depots_.pop_front();
     to_load_.emplace(LoadedScene{checked.state, no_scene()});
     // Without a client nobody below can be asked to load it, and the next client's scene must not wait for that. Or the relay
     // is at work again on the scene that it had, while this one was looked at.

@@ -17,12 +17,12 @@
 /// Test: tests/session/test_relay.cpp, test_simulation.cpp
 
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "pathscope/session/client_machine.hpp"
 #include "pathscope/session/relay_work.hpp"
@@ -138,7 +138,8 @@ class RelayMachine {
     ServerMachine above_;
     std::map<std::string, Caller> callers_;  ///< By instance, bounded.
     std::optional<ClientMachine> below_;
-    std::deque<std::pair<Digest, SceneDepot>> depots_;  ///< By `files` of the state; of the last two scenes.
+    std::vector<std::pair<Digest, SceneDepot>>
+        depots_;  ///< By `files` of the state: of the scene that the machine above has, and of the last one checked.
     std::optional<LoadedScene>
         to_load_;  ///< Checked; the machine above is told when a server below is ready.
 

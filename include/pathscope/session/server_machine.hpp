@@ -116,6 +116,8 @@ class ServerMachine {
     [[nodiscard]] const std::optional<Error>& refusal() const { return refusal_; }
     [[nodiscard]] std::size_t leases() const { return leases_.size(); }
     [[nodiscard]] std::size_t unsent_answers() const { return unsent_answers_.size(); }
+    /// Whether the scene that is here is of these files: then a state of it may come, and there is nothing to load.
+    [[nodiscard]] bool has_scene(const Digest& files) const { return scene_ && scene_state_->files == files; }
     /// Hash of the state that it works on.
     [[nodiscard]] std::optional<Digest> working_on() const {
         return held_ && phase_ == Phase::work ? std::optional(held_->hash) : std::nullopt;
