@@ -92,7 +92,7 @@ bool PathBatch::leave(std::uint32_t number, int bounce, const BounceSample& rand
     path.throughput *= next->weight;
     if (is_zero(path.throughput)) return false;
     if (!is_finite(path.throughput)) {  // Not a radiance: the caller drops and counts the sample.
-        radiance_[number].indirect = path.throughput;
+        if (parts_.indirect) radiance_[number].indirect = path.throughput;
         if (direct_lives) radiance_[number].direct = path.throughput;
         return false;
     }

@@ -162,6 +162,23 @@ class Faults(unittest.TestCase):
         self.assertEqual(set(samples), {"server-1", "late"})
         self.assertGreater(samples["late"], 0)
 
+    def test_told_to_end_at_once(self):
+        """A program that has just begun, and has threads already, ends as it is told: with exit code 0."""
+        for program in ("pathscope-server", "pathscope-relay"):
+            for _ in range(5):
+                command = [BIN / program, "--quiet"] + (["--listen", "127.0.0.1", "--listen-ports", free_ports()] if program == "pathscope-relay" else [])
+                process = subprocess.Popen(command, env=dict(os.environ, XDG_CACHE_HOME=self.folder), stderr=subprocess.PIPE, text=True)
+                status = pathlib.Path(f"/proc/{process.pid}/status")
+                catches, threads = False, 0
+                while not catches and process.poll() is None:
+                    fields = dict(line.split(":\t", 1) for line in status.read_text().splitlines() if ":\t" in line)
+                    catches = int(fields.get("SigCgt", "0"), 16) >> signal.SIGTERM - 1 & 1
+                    threads = int(fields.get("Threads", "0"))
+                    self.assertFalse(threads > 1 and not catches, f"{program} has {threads} threads, and SIGTERM would kill it")
+                process.terminate()
+                said = process.communicate(timeout=PATIENCE_S)[1]
+                self.assertEqual(process.returncode, 0, f"{program}: {said}")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -1,22 +1,15 @@
 /// pathscope-relay: stands for its servers towards a client. No display, no renderer.
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 
 #include "../common/arguments.hpp"
+#include "../common/stop_signals.hpp"
 #include "options.hpp"
 #include "pathscope/core/log.hpp"
 
 namespace {
 
 using namespace pathscope;
-
-std::atomic<RelaySession*> g_running{nullptr};
-
-void stop(int) {
-    if (RelaySession* session = g_running.load()) session->request_stop();
-}
 
 void say_warnings_only(LogLevel level, std::string_view sentence) {
     if (level == LogLevel::warning)
@@ -34,12 +27,9 @@ int main(int argc, char** argv) {
     }
     const auto& options = std::get<RelayOptions>(*parsed);
     if (options.quiet) set_log_sink(say_warnings_only);
+    StopSignals<RelaySession> signals;
     const auto session = RelaySession::create(options.relay);
     if (!session) return report("pathscope-relay", session.error());
-    g_running.store(session->get());
-    std::signal(SIGINT, stop);
-    std::signal(SIGTERM, stop);
-    const auto done = (*session)->run();
-    g_running.store(nullptr);
+    const auto done = signals.run(**session);
     return done ? 0 : report("pathscope-relay", done.error());
 }

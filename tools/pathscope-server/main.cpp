@@ -1,10 +1,9 @@
 /// pathscope-server: renders indirect light for a client. No display needed.
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 
 #include "../common/arguments.hpp"
+#include "../common/stop_signals.hpp"
 #include "options.hpp"
 #include "pathscope/core/log.hpp"
 
@@ -12,23 +11,13 @@ namespace {
 
 using namespace pathscope;
 
-template <class Session>
-std::atomic<Session*> g_running{nullptr};
-
-template <class Session>
-void stop(int) {
-    if (Session* session = g_running<Session>.load()) session->request_stop();
-}
-
 /// Until a signal or the client ends it.
-template <class Session>
-int run(const Result<std::unique_ptr<Session>>& session) {
+template <class Session, class Options>
+int run(const Options& options) {
+    StopSignals<Session> signals;
+    const auto session = Session::create(options);
     if (!session) return report("pathscope-server", session.error());
-    g_running<Session>.store(session->get());
-    std::signal(SIGINT, stop<Session>);
-    std::signal(SIGTERM, stop<Session>);
-    const auto done = (*session)->run();
-    g_running<Session>.store(nullptr);
+    const auto done = signals.run(**session);
     return done ? 0 : report("pathscope-server", done.error());
 }
 
@@ -47,6 +36,5 @@ int main(int argc, char** argv) {
             if (level == LogLevel::warning)
                 std::fprintf(stderr, "warning: %.*s\n", int(sentence.size()), sentence.data());
         });
-    return options.ghosts.count > 0 ? run(GhostHost::create(options.ghosts))
-                                    : run(ServerSession::create(options.server));
+    return options.ghosts.count > 0 ? run<GhostHost>(options.ghosts) : run<ServerSession>(options.server);
 }
