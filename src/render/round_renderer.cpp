@@ -64,8 +64,9 @@ class RowSums {
 /// Calls finish(sample, its radiance) for each sample of the row, pixel by pixel.
 template <class Finish>
 void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finish finish) {
-    const auto& [scene, camera, settings, round, work_done, y] = task;
-    PathBatch batch(scene, settings.transport, parts);
+    const RenderSettings& settings = task.settings;
+    const Round& round = task.round;
+    PathBatch batch(task.scene, settings.transport, parts);
     std::vector<RowSample> samples;
     std::vector<PixelSampler> samplers;
     SamplerBatch seeds;
@@ -73,10 +74,11 @@ void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finis
     const auto trace_batch = [&] {
         get_2d(seeds, k_pixel_dimension, places);
         for (std::size_t i = 0; i < samples.size(); ++i)
-            batch.add(camera_ray(camera, samples[i].x, y, {places.x[0][i], places.y[0][i]}), samplers[i]);
+            batch.add(camera_ray(task.camera, samples[i].x, task.y, {places.x[0][i], places.y[0][i]}),
+                      samplers[i]);
         const std::span<const PartsRadiance> radiance = batch.trace(rays);
         for (std::size_t i = 0; i < samples.size(); ++i) finish(samples[i], radiance[i]);
-        if (work_done) work_done->fetch_add(samples.size(), std::memory_order_relaxed);
+        if (task.work_done) task.work_done->fetch_add(samples.size(), std::memory_order_relaxed);
         samples.clear();
         samplers.clear();
         seeds.size = 0;
@@ -84,7 +86,7 @@ void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finis
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t number = round.first; number < round.first + round.count; ++number) {
             samples.push_back({x, number});
-            samplers.emplace_back(settings.transport.sampler, settings.seed, x, y, number);
+            samplers.emplace_back(settings.transport.sampler, settings.seed, x, task.y, number);
             seeds.add(samplers.back());
             if (samples.size() == PathBatch::k_capacity) trace_batch();
         }
