@@ -32,7 +32,7 @@ struct SpatialSplit {
                                     std::vector<Reference>& references, std::size_t begin);
 
 /// The parts of a reference on the two sides of a plane that crosses its box. Their boxes together hold all that its own box
-/// holds of the triangle, whatever is rounded.
+/// holds of the triangle, whatever is rounded. Requires: coordinates as geometry/triangle.hpp.
 struct CutReference {
     Reference left, right;
 };

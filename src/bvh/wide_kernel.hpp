@@ -17,9 +17,10 @@ inline namespace PATHSCOPE_SIMD {
 ///
 ///     (plane - o) / d  =  plane / d  +  offset,      offset = -o / d
 ///
-/// The rounding of the offset moves o by another half ulp of its own, of the four that BoxRay has moved it. But infinity
-/// minus infinity is no number, and would meet every box; so 1/d ends at 2^24 times that of the longest axis. BoxRay moves o
-/// by 2^-20 of the scene at least, so a ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
+/// The roundings of the offset and, where the step is not fused, of the product move o by 2 * 2^-24 of itself, of the three that
+/// BoxRay has left; of the scene they take no more than the three that they replace. But infinity minus infinity is no number, and
+/// would meet every box; so 1/d ends at 2^24 times that of the longest axis. BoxRay moves o by 2^-20 of the scene at least, so a
+/// ray in a slab still leaves it at t = 16 scenes, which is behind any hit.
 struct WideBoxRay {
     struct Slab {
         Float8 near_offset, far_offset, inverse;

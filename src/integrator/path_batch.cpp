@@ -24,25 +24,37 @@ void PathBatch::add(const Ray& camera_ray, const PixelSampler& sampler) {
     rays_.push_back(camera_ray);
 }
 
-std::span<const PartsRadiance> PathBatch::trace(std::uint64_t& rays) {
-    hits_.resize(size());
-    radiance_.assign(size(), {});
-    alive_.resize(size());
-    for (std::uint32_t path = 0; path < size(); ++path) alive_[path] = path;
+/// Takes a step of each path, by its number and its place among those alive; those for which step() is false are alive no more.
+template <class Step>
+void PathBatch::keep_alive(Step step) {
+    std::size_t kept = 0;
+    for (std::size_t place = 0; place < alive_.size(); ++place)
+        if (const std::uint32_t path = alive_[place]; step(path, place)) alive_[kept++] = path;
+    alive_.resize(kept);
+}
 
-    for (std::size_t begin = 0; begin < size(); begin += k_packet_rays) {
-        const std::size_t count = std::min(k_packet_rays, size() - begin);
+std::span<const PartsRadiance> PathBatch::trace(std::uint64_t& rays) {
+    const std::size_t samples = size();
+    CHECK(samples > 0);
+    hits_.resize(samples);
+    radiance_.assign(samples, {});
+    alive_.resize(samples);
+    for (std::uint32_t path = 0; path < samples; ++path) alive_[path] = path;
+
+    for (std::size_t begin = 0; begin < samples; begin += k_packet_rays) {
+        const std::size_t count = std::min(k_packet_rays, samples - begin);
         intersect(scene_, std::span(rays_).subspan(begin, count), std::span(hits_).subspan(begin, count));
     }
-    rays += size();
+    rays += samples;
     for (int bounce = 0;; ++bounce) {
-        std::erase_if(alive_, [&](std::uint32_t path) { return !arrive(path, bounce); });
+        keep_alive([&](std::uint32_t path, std::size_t) { return arrive(path, bounce); });
         if (alive_.empty()) break;
         requests_.clear();
         lights_.clear();
         draw_numbers(bounce);
-        std::size_t place = 0;
-        std::erase_if(alive_, [&](std::uint32_t path) { return !leave(path, bounce, {numbers_, place++}); });
+        keep_alive([&](std::uint32_t path, std::size_t place) {
+            return leave(path, bounce, {numbers_, place});
+        });
         collect_light(bounce);
         for (const std::uint32_t path : alive_) intersect(scene_, rays_[path], hits_[path]);
         rays += lights_.size() + alive_.size();
@@ -66,11 +78,11 @@ bool PathBatch::arrive(std::uint32_t number, int bounce) {
                 radiance_[number].indirect += path.throughput * emitted;
         }
     }
-    return path.indirect_lives && hit && !(settings_.max_bounces > 0 && bounce == settings_.max_bounces);
+    return path.goes_on && hit && !(settings_.max_bounces > 0 && bounce == settings_.max_bounces);
 }
 
 void PathBatch::draw_numbers(int bounce) {
-    samplers_.size = 0;
+    samplers_.clear();
     for (const std::uint32_t path : alive_) samplers_.add(paths_[path].sampler);
     get_2d(samplers_, BounceSample::first_dimension(bounce), numbers_);
 }
@@ -100,13 +112,13 @@ bool PathBatch::leave(std::uint32_t number, int bounce, const BounceSample& rand
     path.strength.now = max_component(path.throughput);
     if (is_first_diffuse) path.strength.first = path.strength.now;
     if (path.diffuse_vertices > 0 && !parts_.indirect) {
-        path.indirect_lives = false;
+        path.goes_on = false;
     } else if (path.diffuse_vertices > 0 || bounce >= k_free_specular_bounces) {
         const std::optional<float> weight = roulette_weight(
             path.strength, bounce, [&] { return random.roulette(); }, settings_.roulette);
-        path.indirect_lives = weight.has_value();
+        path.goes_on = weight.has_value();
         // Before the first diffuse vertex both parts play; at it the indirect one alone.
-        if (!path.indirect_lives && !(is_first_diffuse && direct_lives)) return false;
+        if (!path.goes_on && !(is_first_diffuse && direct_lives)) return false;
         if (weight) path.throughput *= *weight;
         if (path.diffuse_vertices == 0) path.direct_throughput = path.throughput;
     }

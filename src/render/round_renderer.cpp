@@ -81,7 +81,7 @@ void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finis
         if (task.work_done) task.work_done->fetch_add(samples.size(), std::memory_order_relaxed);
         samples.clear();
         samplers.clear();
-        seeds.size = 0;
+        seeds.clear();
     };
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t number = round.first; number < round.first + round.count; ++number) {

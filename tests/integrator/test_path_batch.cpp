@@ -33,6 +33,7 @@ std::vector<TransportSettings> all_levers() {
                         settings.roulette.kind = roulette;
                         settings.roulette.first_bounce = first_bounce;
                         settings.max_bounces = max_bounces;
+                        settings.light_samples = int(list.size() % 4);  // 0 = one or two.
                         list.push_back(settings);
                     }
     return list;
@@ -89,10 +90,13 @@ Tally compare(const Scene& scene, const TransportSettings& settings, int samples
 TEST_CASE(
     "samples side by side, both parts or one, are the samples one by one, to the last bit, with every "
     "lever") {
-    const Scene room = small_room(), mirrors = hall_of_mirrors(), box = furnace(0.5f, 0.8f);
-    for (const Scene* scene : {&room, &mirrors, &box})
+    const Scene room = small_room(), mirrors = hall_of_mirrors(), box = furnace(0.5f, 0.8f),
+                lamps = room_of_lamps();
+    for (const Scene* scene : {&room, &mirrors, &box, &lamps})
         for (const TransportSettings& settings : all_levers()) {
             CAPTURE(name_of(settings.mis));
+            CAPTURE(name_of(settings.roulette.kind));
+            CAPTURE(settings.light_samples);
             CAPTURE(settings.max_bounces);
             const Tally tally = compare(*scene, settings, k_sanitized ? 4 : 32);
             CHECK(tally.lit_direct > 0);

@@ -16,7 +16,7 @@ TEST_CASE(
             if (level > highest_simd_level()) continue;
             CAPTURE(level_name);
             const GetPairs get_pairs = get_pairs_kernel(level);
-            for (const std::size_t count : {1, 4, 5, 15, 16, 17, 100, 128}) {
+            for (const std::size_t count : {1, 4, 5, 15, 16, 17, 100, 255, 256}) {
                 SamplerBatch batch;
                 std::vector<PixelSampler> samplers;
                 for (std::size_t i = 0; i < count; ++i) {

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from performance.plot import INK, LOOKS, SOFT, WIDTH, Canvas, Panel, Picture, axis_around, decades
 
-BOX_OPERATIONS = 20  # Six differences, six products, three maxima, three minima, a stretch and a comparison (wide_kernel.hpp).
+BOX_OPERATIONS = 19  # Six products, six sums, three maxima, three minima and a comparison (wide_kernel.hpp).
 TRIANGLE_OPERATIONS = 36  # Of one that is missed: 21 to see its corners along the ray, 9 for its edges, 6 to compare them.
 LANES, NODE_BYTES, BLOCK_BYTES = 8, 256, 320  # wide_bvh.hpp
 FLOORS = ["arithmetic", "bandwidth", "dependent loads"]

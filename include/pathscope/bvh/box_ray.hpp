@@ -9,9 +9,9 @@
 ///
 /// - Rounding. Each t is off by three roundings, up to 3 * 2^-24 of itself: a ray through an edge of the box, or
 ///   along a face of a flat one, can fall between near and far. And the triangle test (geometry/triangle.hpp) has an error
-///   of its own, up to 11.5 * 2^-24 of the distances along an axis, by which a hit may stick out of its box. So the origin is
-///   moved, towards the near planes for t_near and away from the far ones for t_far, by 16 * 2^-24 of the scene, and a few
-///   ulps of its own, lest the sum be rounded away.
+///   of its own, up to 9 * 2^-24 of the distances along an axis, by which a hit may stick out of its box. So the origin is
+///   moved, towards the near planes for t_near and away from the far ones for t_far, by 16 * 2^-24 of the scene, of which
+///   both together take 12, and by 4 * 2^-24 of itself, of which rounding the sum takes one.
 /// - Division by zero. A direction component of 0 has an infinite inverse, and 0 * infinity is NaN where the origin is
 ///   on a plane. The moved origin is not: where the origin is on the border of the slab, it is inside, and the products
 ///   are -infinity and +infinity.

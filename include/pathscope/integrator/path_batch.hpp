@@ -3,6 +3,8 @@
 ///
 ///     radiance of a sample  =  { estimate_radiance<direct>(...), estimate_radiance<indirect>(...) },   bit by bit
 ///
+/// (Of a sample that is no radiance, neither of the two is one.)
+///
 /// Why: what paths have to do at the same time can be done together. Camera rays are traced in packets, random numbers are made
 /// for a register full of paths, and shadow rays of neighbouring points are asked one after the other, so that they are stopped by
 /// what stopped the last one. And where both parts are asked for, a client without servers, the walk that they share is walked
@@ -37,17 +39,18 @@ class PathBatch {
     /// Most paths in a batch. Of 32 too few are left after some bounces to fill registers; more than these gain nothing.
     static constexpr std::size_t k_capacity = k_sampler_batch;
 
-    /// scene, settings: must outlive the batch.
+    /// scene, settings: must outlive the batch, unchanged.
     PathBatch(const Scene& scene, const TransportSettings& settings, LightParts parts);
 
-    [[nodiscard]] std::size_t size() const { return paths_.size(); }
+    /// Of the samples that were added since the last trace().
+    [[nodiscard]] std::size_t size() const { return traced_ ? 0 : paths_.size(); }
     [[nodiscard]] bool full() const { return size() == k_capacity; }
 
     /// A sample, by its camera ray. Rays of neighbouring pixels, one after the other, are traced faster. Requires: !full().
     void add(const Ray& camera_ray, const PixelSampler& sampler);
 
     /// Follows all paths to their ends. The radiances, in the order of add(), are there until the next add(), which begins a
-    /// new batch. rays: counts all that are traced.
+    /// new batch. rays: counts all that are traced. Requires: something was added.
     [[nodiscard]] std::span<const PartsRadiance> trace(std::uint64_t& rays);
 
   private:
@@ -60,7 +63,7 @@ class PathBatch {
         PathStrength strength;
         PathOrigin origin;
         int diffuse_vertices = 0;
-        bool indirect_lives = true;
+        bool goes_on = true;  // Beyond what the next ray meets.
     };
     /// The light samples at a vertex of a path.
     struct LightRequest {
@@ -70,6 +73,8 @@ class PathBatch {
         std::size_t end;  // Of its rays.
     };
 
+    template <class Step>
+    void keep_alive(Step step);
     [[nodiscard]] bool arrive(std::uint32_t path, int bounce);
     void draw_numbers(int bounce);
     [[nodiscard]] bool leave(std::uint32_t path, int bounce, const BounceSample& random);

@@ -46,7 +46,7 @@ struct NullPathProbe {
 /// otherwise make noise where the textbook has none. Beyond it, two facing mirrors must end as well.
 inline constexpr int k_free_specular_bounces = 16;
 
-/// A ray and what it hits. Camera rays may be traced many at once (render/round_renderer.hpp), before their paths begin.
+/// A ray and what it hits. Camera rays may be traced many at once (path_batch.hpp), before their paths begin.
 struct TracedRay {
     Ray ray;
     std::optional<SceneHit> hit;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <span>
 
+#include "pathscope/core/check.hpp"
 #include "pathscope/math/simd_level.hpp"
 #include "pathscope/sampling/sampler.hpp"
 
@@ -26,8 +27,10 @@ struct SamplerBatch {
     std::size_t size = 0;
     alignas(64) Row pixel_key{}, sample{}, reversed_sample{};
 
+    void clear() { size = 0; }
     /// Requires: of the kind of the others, which are fewer than k_sampler_batch.
     void add(const PixelSampler& sampler) {
+        CHECK(size < k_sampler_batch && (size == 0 || kind == sampler.kind()), size);
         const auto seed = sampler.seed();
         kind = sampler.kind();
         pixel_key[size] = seed.pixel_key;
