@@ -310,7 +310,7 @@ class Floors(unittest.TestCase):
         times = limit_figures.ray_times([self.row(), self.row(rays="primary", triangles=1000)], limits_file())
         picture = limit_figures.picture(times)
         places = markers(picture)
-        x = [places[f"box, shadow: {what} ns"][0] for what in ("dependent loads 6", "arithmetic 5.92", "bandwidth 13", "measured 200")]
+        x = [places[f"box, shadow: {what} ns"][0] for what in ("arithmetic 5.92", "dependent loads 6", "bandwidth 13", "measured 200")]
         self.assertEqual(x, sorted(x))
         self.assertAlmostEqual(x[3], places["box, primary: measured 200 ns"][0])
         self.assertIn("arithmetic for 0, bandwidth for 2, dependent loads for 0 of 2", picture.alt)
