@@ -18,7 +18,7 @@ from processes import free_ports
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 SCENE = "scenes/cornell/scene.json"
-JOB = ["--size", "160x120", "--spp", "64", "--direct-spp", "4", "--seed", "7"]
+JOB = ["--size", "160x120", "--spp", "384", "--direct-spp", "4", "--seed", "7"]
 PATIENCE_S = 300  # A run that takes longer has failed.
 
 
