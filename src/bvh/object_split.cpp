@@ -3,29 +3,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 
 namespace pathscope {
 namespace {
 
+/// Not empty by itself: most sets are small, and would spend more time on emptying all bins than on those that they use.
 struct Bin {
-    WideBox box;
-    std::uint32_t count = 0;
-};
+    Float4 low, high;
+    std::uint32_t count;
 
-/// The bins of the three axes. Most sets are small, and would spend more time on emptying all bins than on those that they use.
-class Bins {
-  public:
-    explicit Bins(int count) {
-        for (auto& axis : axes_) std::uninitialized_default_construct_n(axis.begin(), count);
+    void clear() { *this = {WideBox{}.low, WideBox{}.high, 0}; }
+    [[nodiscard]] WideBox box() const { return {low, high}; }
+    void add(const WideBox& box, std::uint32_t references) {
+        low = min(box.low, low);
+        high = max(box.high, high);
+        count += references;
     }
-    [[nodiscard]] std::array<Bin, k_max_split_bins>& operator[](std::size_t axis) { return axes_[axis]; }
-
-  private:
-    union {
-        std::array<std::array<Bin, k_max_split_bins>, 3> axes_;
-    };
 };
+using AxisBins = std::array<Bin, k_max_split_bins>;
 
 /// Maps centroids to bins, on all axes at once. Finding and applying a split use the same map, so they agree on each side.
 class BinMap {
@@ -59,37 +54,32 @@ int bins_for(std::size_t references, int max_bins) {
     return std::min<int>({max_bins, k_max_split_bins, 4 + static_cast<int>(references / 4)});
 }
 
-void fill(Bins& bins, std::span<const Reference> references, const BinMap& map) {
+void fill(std::array<AxisBins, 3>& bins, std::span<const Reference> references, const BinMap& map) {
     for (const Reference& reference : references) {
         const WideBox box = box_of(reference);
         const auto place = map(box);
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            Bin& bin = bins[axis][std::size_t(place[axis])];
-            bin.box.add(box);
-            ++bin.count;
+            bins[axis][std::size_t(place[axis])].add(box, 1);
         }
     }
 }
 
 /// Sweeps from the right, then from the left, so that each boundary sees both sides.
-void improve(std::optional<ObjectSplit>& best, const std::array<Bin, k_max_split_bins>& bins, int axis,
-             int count) {
+void improve(std::optional<ObjectSplit>& best, const AxisBins& bins, int axis, int count) {
     std::array<double, k_max_split_bins> right_cost;
     std::array<std::uint32_t, k_max_split_bins> right_count;
     Bin sum;
-    const auto add = [&sum](const Bin& bin) {
-        sum.box.add(bin.box);
-        sum.count += bin.count;
-    };
+    sum.clear();
+    const auto add = [&sum](const Bin& bin) { sum.add(bin.box(), bin.count); };
     const auto cost_of_sum = [&sum] {
-        return sum.count == 0 ? 0 : sum.box.half_area() * blocks_of(sum.count);
+        return sum.count == 0 ? 0 : sum.box().half_area() * blocks_of(sum.count);
     };
     for (auto i = std::size_t(count - 1); i > 0; --i) {
         add(bins[i]);
         right_cost[i] = cost_of_sum();
         right_count[i] = sum.count;
     }
-    sum = {};
+    sum.clear();
     for (std::size_t i = 1; i < std::size_t(count); ++i) {
         add(bins[i - 1]);
         if (sum.count == 0 || right_count[i] == 0) continue;
@@ -101,7 +91,7 @@ void improve(std::optional<ObjectSplit>& best, const std::array<Bin, k_max_split
 
 Box union_of(std::span<const Bin> bins) {
     WideBox box;
-    for (const Bin& bin : bins) box.add(bin.box);
+    for (const Bin& bin : bins) box.add(bin.box());
     return box.box();
 }
 
@@ -111,7 +101,8 @@ std::optional<ObjectSplit> find_object_split(std::span<const Reference> referenc
                                              const ReferenceBounds& bounds, int max_bins) {
     const int count = bins_for(references.size(), max_bins);
     const BinMap map(bounds.centroids, count);
-    Bins bins(count);
+    std::array<AxisBins, 3> bins;
+    for (AxisBins& axis : bins) std::for_each_n(axis.begin(), count, [](Bin& bin) { bin.clear(); });
     fill(bins, references, map);
     std::optional<ObjectSplit> best;
     for (int axis = 0; axis < 3; ++axis)

@@ -1,27 +1,27 @@
 #include "pathscope/integrator/path_batch.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 #include "pathscope/core/check.hpp"
 
 namespace pathscope {
 
-PathBatch::PathBatch(const Scene& scene, const TransportSettings& settings, LightParts parts)
-    : scene_(scene), settings_(settings), parts_(parts), light_count_(light_sample_count(scene, settings)) {
+PathBatch::PathBatch(const Scene& scene, const CameraFrame& camera, const TransportSettings& settings,
+                     LightParts parts)
+    : scene_(scene),
+      camera_(camera),
+      settings_(settings),
+      parts_(parts),
+      light_count_(light_sample_count(scene, settings)) {
     paths_.reserve(k_capacity);
-    rays_.reserve(k_capacity);
-    alive_.reserve(k_capacity);
 }
 
-void PathBatch::add(const Ray& camera_ray, const PixelSampler& sampler) {
-    if (traced_) {
-        paths_.clear();
-        rays_.clear();
-        traced_ = false;
-    }
+void PathBatch::add(int x, int y, const PixelSampler& sampler) {
+    if (std::exchange(traced_, false)) paths_.clear();
     CHECK(!full());
-    paths_.emplace_back(sampler);
-    rays_.push_back(camera_ray);
+    paths_.emplace_back(x, y, sampler);
 }
 
 /// Takes a step of each path, by its number and its place among those alive; those for which step() is false are alive no more.
@@ -33,25 +33,40 @@ void PathBatch::keep_alive(Step step) {
     alive_.resize(kept);
 }
 
+/// Of the paths that are alive.
+template <std::size_t dimensions>
+void PathBatch::draw_numbers(std::uint32_t first_dimension, PairRows<dimensions>& numbers) {
+    samplers_.clear();
+    for (const std::uint32_t path : alive_) samplers_.add(paths_[path].sampler);
+    get_2d(samplers_, first_dimension, numbers);
+}
+
+void PathBatch::trace_camera_rays() {
+    draw_numbers(k_pixel_dimension, places_);
+    rays_.resize(alive_.size());
+    hits_.resize(alive_.size());
+    for (std::size_t i = 0; i < rays_.size(); ++i)
+        rays_[i] = camera_ray(camera_, paths_[i].x, paths_[i].y, {places_.x[0][i], places_.y[0][i]});
+    for (std::size_t begin = 0; begin < rays_.size(); begin += k_packet_rays) {
+        const std::size_t count = std::min(k_packet_rays, rays_.size() - begin);
+        intersect(scene_, std::span(rays_).subspan(begin, count), std::span(hits_).subspan(begin, count));
+    }
+}
+
 std::span<const PartsRadiance> PathBatch::trace(std::uint64_t& rays) {
     const std::size_t samples = size();
     CHECK(samples > 0);
-    hits_.resize(samples);
     radiance_.assign(samples, {});
     alive_.resize(samples);
-    for (std::uint32_t path = 0; path < samples; ++path) alive_[path] = path;
-
-    for (std::size_t begin = 0; begin < samples; begin += k_packet_rays) {
-        const std::size_t count = std::min(k_packet_rays, samples - begin);
-        intersect(scene_, std::span(rays_).subspan(begin, count), std::span(hits_).subspan(begin, count));
-    }
+    std::iota(alive_.begin(), alive_.end(), 0u);
+    trace_camera_rays();
     rays += samples;
     for (int bounce = 0;; ++bounce) {
         keep_alive([&](std::uint32_t path, std::size_t) { return arrive(path, bounce); });
         if (alive_.empty()) break;
         requests_.clear();
         lights_.clear();
-        draw_numbers(bounce);
+        draw_numbers(BounceSample::first_dimension(bounce), numbers_);
         keep_alive([&](std::uint32_t path, std::size_t place) {
             return leave(path, bounce, {numbers_, place});
         });
@@ -79,12 +94,6 @@ bool PathBatch::arrive(std::uint32_t number, int bounce) {
         }
     }
     return path.goes_on && hit && !(settings_.max_bounces > 0 && bounce == settings_.max_bounces);
-}
-
-void PathBatch::draw_numbers(int bounce) {
-    samplers_.clear();
-    for (const std::uint32_t path : alive_) samplers_.add(paths_[path].sampler);
-    get_2d(samplers_, BounceSample::first_dimension(bounce), numbers_);
 }
 
 /// Asks for the light at the vertex, and makes the next ray. Whether there is one.

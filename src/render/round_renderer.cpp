@@ -66,29 +66,19 @@ template <class Finish>
 void trace_row(const RowTask& task, LightParts parts, std::uint64_t& rays, Finish finish) {
     const RenderSettings& settings = task.settings;
     const Round& round = task.round;
-    PathBatch batch(task.scene, settings.transport, parts);
+    PathBatch batch(task.scene, task.camera, settings.transport, parts);
     std::vector<RowSample> samples;
-    std::vector<PixelSampler> samplers;
-    SamplerBatch seeds;
-    PairRows<1> places;  // Within the pixel.
     const auto trace_batch = [&] {
-        get_2d(seeds, k_pixel_dimension, places);
-        for (std::size_t i = 0; i < samples.size(); ++i)
-            batch.add(camera_ray(task.camera, samples[i].x, task.y, {places.x[0][i], places.y[0][i]}),
-                      samplers[i]);
         const std::span<const PartsRadiance> radiance = batch.trace(rays);
         for (std::size_t i = 0; i < samples.size(); ++i) finish(samples[i], radiance[i]);
         if (task.work_done) task.work_done->fetch_add(samples.size(), std::memory_order_relaxed);
         samples.clear();
-        samplers.clear();
-        seeds.clear();
     };
     for (int x = round.rect.x; x < round.rect.x + round.rect.width; ++x)
         for (std::uint32_t number = round.first; number < round.first + round.count; ++number) {
             samples.push_back({x, number});
-            samplers.emplace_back(settings.transport.sampler, settings.seed, x, task.y, number);
-            seeds.add(samplers.back());
-            if (samples.size() == PathBatch::k_capacity) trace_batch();
+            batch.add(x, task.y, PixelSampler(settings.transport.sampler, settings.seed, x, task.y, number));
+            if (batch.full()) trace_batch();
         }
     if (!samples.empty()) trace_batch();
 }

@@ -1,25 +1,12 @@
-#include "pathscope/math/simd_level.hpp"
+#include "sampling/pairs_kernels.hpp"
 
 #if defined(PATHSCOPE_HAS_SIMD_LEVELS)
-
-// All that is shared with other instruction sets comes first; of sampler.hpp nothing is used here but templates of a vector that no
-// other file uses.
-#include <array>
-#include <cstring>
-#include <memory>
-#include <span>
-
-#include "pathscope/core/enum_names.hpp"
-#include "pathscope/math/vec.hpp"
-
 #pragma GCC target("avx2")
 #include "sampling/pairs_kernel.hpp"
-#include "sampling/pairs_kernels.hpp"
 
 namespace pathscope {
 void get_pairs_avx2(const SamplerBatch& batch, std::uint32_t dimension, float* x, float* y) {
     get_pairs<EightBits>(batch, dimension, x, y);
 }
 }  // namespace pathscope
-
 #endif

@@ -1,4 +1,3 @@
-#include "pathscope/core/check.hpp"
 #include "sampling/pairs_kernel.hpp"
 #include "sampling/pairs_kernels.hpp"
 

@@ -83,9 +83,12 @@ inline Scene room_of_lamps() {
 }
 
 /// A ray of a small square picture of the room.
+inline CameraFrame room_camera(int size) {
+    return make_camera({{0, 0, 0.95f}, {0, -0.1f, 0}, {0, 1, 0}, 80}, size, size);
+}
+
 inline Ray room_ray(int x, int y, int size, const PixelSampler& sampler) {
-    const CameraFrame camera = make_camera({{0, 0, 0.95f}, {0, -0.1f, 0}, {0, 1, 0}, 80}, size, size);
-    return camera_ray(camera, x, y, sampler.get_2d(k_pixel_dimension));
+    return camera_ray(room_camera(size), x, y, sampler.get_2d(k_pixel_dimension));
 }
 
 }  // namespace pathscope::testing

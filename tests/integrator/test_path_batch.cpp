@@ -48,8 +48,10 @@ struct Tally {
 Tally compare(const Scene& scene, const TransportSettings& settings, int samples) {
     Tally tally;
     const int size = 8;
-    PathBatch both(scene, settings, {true, true}), direct_only(scene, settings, {true, false}),
-        indirect_only(scene, settings, {false, true});
+    const CameraFrame camera = room_camera(size);
+    PathBatch both(scene, camera, settings, {true, true}),
+        direct_only(scene, camera, settings, {true, false}),
+        indirect_only(scene, camera, settings, {false, true});
     std::uint64_t rays_direct = 0, rays_indirect = 0;
     std::vector<PartsRadiance> expected;
     const auto check_batch = [&] {
@@ -70,14 +72,13 @@ Tally compare(const Scene& scene, const TransportSettings& settings, int samples
         for (int sample = 0; sample < samples; ++sample) {
             const int x = i % size, y = i / size;
             const PixelSampler sampler(settings.sampler, 5, x, y, std::uint32_t(sample));
-            const TracedRay first = trace(scene, room_ray(x, y, size, sampler));
-            tally.rays_apart += 2;
+            const Ray ray = room_ray(x, y, size, sampler);
             expected.push_back(
-                {estimate_radiance<LightPart::direct>(scene, settings, first, sampler, tally.rays_apart),
-                 estimate_radiance<LightPart::indirect>(scene, settings, first, sampler, tally.rays_apart)});
+                {estimate_radiance<LightPart::direct>(scene, settings, ray, sampler, tally.rays_apart),
+                 estimate_radiance<LightPart::indirect>(scene, settings, ray, sampler, tally.rays_apart)});
             tally.lit_direct += !is_zero(expected.back().direct);
             tally.lit_indirect += !is_zero(expected.back().indirect);
-            for (PathBatch* batch : {&both, &direct_only, &indirect_only}) batch->add(first.ray, sampler);
+            for (PathBatch* batch : {&both, &direct_only, &indirect_only}) batch->add(x, y, sampler);
             if (both.full()) check_batch();
         }
     if (!expected.empty()) check_batch();

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "pathscope/integrator/path_estimator.hpp"
+#include "pathscope/scene/camera.hpp"
 
 namespace pathscope {
 
@@ -39,15 +40,16 @@ class PathBatch {
     /// Most paths in a batch. Of 32 too few are left after some bounces to fill registers; more than these gain nothing.
     static constexpr std::size_t k_capacity = k_sampler_batch;
 
-    /// scene, settings: must outlive the batch, unchanged.
-    PathBatch(const Scene& scene, const TransportSettings& settings, LightParts parts);
+    /// scene, camera, settings: must outlive the batch, unchanged.
+    PathBatch(const Scene& scene, const CameraFrame& camera, const TransportSettings& settings,
+              LightParts parts);
 
     /// Of the samples that were added since the last trace().
     [[nodiscard]] std::size_t size() const { return traced_ ? 0 : paths_.size(); }
     [[nodiscard]] bool full() const { return size() == k_capacity; }
 
-    /// A sample, by its camera ray. Rays of neighbouring pixels, one after the other, are traced faster. Requires: !full().
-    void add(const Ray& camera_ray, const PixelSampler& sampler);
+    /// A sample of pixel (x, y), somewhere in it. Neighbouring pixels, one after the other, are traced faster. Requires: !full().
+    void add(int x, int y, const PixelSampler& sampler);
 
     /// Follows all paths to their ends. The radiances, in the order of add(), are there until the next add(), which begins a
     /// new batch. rays: counts all that are traced. Requires: something was added.
@@ -55,8 +57,10 @@ class PathBatch {
 
   private:
     struct Path {
-        explicit Path(const PixelSampler& its_sampler) : sampler(its_sampler) {}
+        Path(int its_x, int its_y, const PixelSampler& its_sampler)
+            : x(its_x), y(its_y), sampler(its_sampler) {}
 
+        int x, y;  // The pixel.
         PixelSampler sampler;
         Rgb throughput{1, 1, 1};         // Of the indirect part, roulette included.
         Rgb direct_throughput{1, 1, 1};  // Until the direct part ends.
@@ -76,12 +80,15 @@ class PathBatch {
     template <class Step>
     void keep_alive(Step step);
     [[nodiscard]] bool arrive(std::uint32_t path, int bounce);
-    void draw_numbers(int bounce);
+    template <std::size_t dimensions>
+    void draw_numbers(std::uint32_t first_dimension, PairRows<dimensions>& numbers);
+    void trace_camera_rays();
     [[nodiscard]] bool leave(std::uint32_t path, int bounce, const BounceSample& random);
     void ask_lights(std::uint32_t path, bool direct, const Vertex& vertex, const BounceSample& random);
     void collect_light(int bounce);
 
     const Scene& scene_;
+    const CameraFrame& camera_;
     const TransportSettings& settings_;
     const LightParts parts_;
     const int light_count_;
@@ -96,6 +103,7 @@ class PathBatch {
 
     // Of a bounce.
     SamplerBatch samplers_;  // In the order of alive_, as the next.
+    PairRows<1> places_;     // Within the pixel.
     PairRows<BounceSample::k_decisions> numbers_;
     std::vector<LightRequest> requests_;
     std::vector<UnshadowedLight> lights_;

@@ -46,22 +46,12 @@ struct NullPathProbe {
 /// otherwise make noise where the textbook has none. Beyond it, two facing mirrors must end as well.
 inline constexpr int k_free_specular_bounces = 16;
 
-/// A ray and what it hits. Camera rays may be traced many at once (path_batch.hpp), before their paths begin.
-struct TracedRay {
-    Ray ray;
-    std::optional<SceneHit> hit;
-};
-
-[[nodiscard]] inline TracedRay trace(const Scene& scene, const Ray& ray) {
-    return {ray, intersect(scene, ray)};
-}
-
-/// rays: counts those that are traced here; `first` was counted by whoever traced it.
+/// ray: the camera ray. rays: counts all that are traced.
 template <LightPart part, class Probe = NullPathProbe>
-[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings,
-                                    const TracedRay& first, const PixelSampler& sampler, std::uint64_t& rays,
-                                    Probe&& probe = {}) {
-    auto [ray, hit] = first;
+[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings, Ray ray,
+                                    const PixelSampler& sampler, std::uint64_t& rays, Probe&& probe = {}) {
+    std::optional<SceneHit> hit = intersect(scene, ray);
+    ++rays;
     Rgb radiance;
     Rgb throughput{1, 1, 1};
     PathStrength strength;
@@ -117,14 +107,6 @@ template <LightPart part, class Probe = NullPathProbe>
         ++rays;
     }
     return radiance;
-}
-
-/// The same for a ray that is not traced yet.
-template <LightPart part, class Probe = NullPathProbe>
-[[nodiscard]] Rgb estimate_radiance(const Scene& scene, const TransportSettings& settings, const Ray& ray,
-                                    const PixelSampler& sampler, std::uint64_t& rays, Probe&& probe = {}) {
-    ++rays;
-    return estimate_radiance<part>(scene, settings, trace(scene, ray), sampler, rays, probe);
 }
 
 }  // namespace pathscope

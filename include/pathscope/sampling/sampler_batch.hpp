@@ -1,5 +1,7 @@
 #pragma once
-/// The random numbers of many samples at once: each is that of the sample's own PixelSampler, bit by bit.
+/// The random numbers of many samples at once.
+///
+///     {x[d][i], y[d][i]}  =  get_2d(first + d)  of the PixelSampler of sample i,   bit by bit
 ///
 /// Why: a path asks for about ten numbers at each vertex, and each is a hundred integer steps. They are the same steps for all
 /// samples, so a register does them for as many as it has lanes: compiled for each instruction set, as the trees are
@@ -10,7 +12,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "pathscope/core/check.hpp"
 #include "pathscope/math/simd_level.hpp"
