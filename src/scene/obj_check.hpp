@@ -4,7 +4,7 @@
 /// tinyobjloader takes a number that it cannot read for zero, and an index out of range for a matter of whoever
 /// uses it. It also passes over smoothing groups and splits names at blanks when it hands out faces one by one.
 /// After this check every v, vn and vt has its numbers, and every face three corners or more that exist.
-/// Thread safety: yes.   Test: tests/scene/test_obj.cpp
+/// Thread safety: yes.   Test: tests/scene/test_obj_check.cpp
 
 #include <cstdint>
 #include <string>

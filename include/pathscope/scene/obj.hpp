@@ -14,7 +14,7 @@
 ///
 /// Reference: Thürmer & Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
 ///
-/// Thread safety: yes.   Test: tests/scene/test_obj.cpp
+/// Thread safety: yes.   Test: tests/scene/test_obj.cpp, test_obj_check.cpp
 
 #include <cstddef>
 #include <string>
