@@ -4,7 +4,7 @@
 /// Why: no way of sending a large triangle to one side or the other keeps its box out of the way of its neighbours. Cut in
 /// two it is in both leaves, but each box holds only what is there.
 ///
-/// Source: Stich, Friedrich & Dietrich 2009.
+/// Source: Stich, Friedrich & Dietrich 2009.   Test: tests/bvh/test_spatial_split.cpp
 
 #include <optional>
 #include <span>

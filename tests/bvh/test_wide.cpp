@@ -3,7 +3,6 @@
 #include <set>
 
 #include "../../src/bvh/binary_tree.hpp"
-#include "../../src/bvh/spatial_split.hpp"
 #include "bvh/oracle.hpp"
 #include "pathscope/bvh/wide_traverse.hpp"
 
@@ -322,34 +321,4 @@ TEST_CASE("no other choice of eight children is cheaper: all of them, for small 
         const double expected = Search{tree}.single(0) / tree.nodes[0].box.half_area();
         CHECK(stats.cost == doctest::Approx(expected).epsilon(1e-5));
     }
-}
-
-TEST_CASE("the two parts of a reference that is cut hold all of the triangle in its box") {
-    HashRng rng(11);
-    const Mesh mesh = random_soup(2000, 12);
-    int points = 0, lost = 0;
-    for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
-        const TriangleCorners triangle = corners(mesh, i);
-        const Box box = bounds(triangle);
-        const int axis = static_cast<int>(rng.next_u32() % 3);
-        const float plane = lerp(box.low[axis], box.high[axis], rng.next_float());
-        if (!(box.low[axis] < plane && plane < box.high[axis])) continue;
-        const CutReference parts = cut(mesh, {box.low, i, box.high, 0}, axis, plane);
-        CHECK(parts.left.high[axis] <= plane);
-        CHECK(parts.right.low[axis] >= plane);
-        const auto holds = [](const Reference& part, Vec3 p) {
-            const float e = 1e-6f;  // The test's own rounding.
-            return p.x >= part.low.x - e && p.y >= part.low.y - e && p.z >= part.low.z - e &&
-                   p.x <= part.high.x + e && p.y <= part.high.y + e && p.z <= part.high.z + e;
-        };
-        for (int k = 0; k < 50; ++k) {
-            float u = rng.next_float(), v = rng.next_float();
-            if (u + v > 1) u = 1 - u, v = 1 - v;
-            const Vec3 p = triangle.at(u, v);
-            ++points;
-            lost += !(p[axis] <= plane ? holds(parts.left, p) : holds(parts.right, p));
-        }
-    }
-    CHECK(points > 50000);
-    CHECK(lost == 0);
 }
